@@ -1,0 +1,57 @@
+"""What every reader of a log format offers: channels, and each channel's messages as columns."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from navreplay.timeline import Times
+
+__all__ = ["Channel", "Log", "Table"]
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """One channel of a log. name: the topic, or the file's name where a file is one channel. type: full message type
+    (``sensor_msgs/msg/Imu``, ``foxglove.LocationFix``) or the name of a layout. encoding: ``cdr``, ``ros1``, ``json``,
+    ``protobuf``, ``text``. count: messages, None where only reading would tell."""
+
+    name: str
+    type: str
+    encoding: str
+    count: int | None
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Table:
+    """Messages of one channel as columns of equal length, in file order.
+
+    log_time_ns: (n,) int64 receive time in the file's own base (UTC for ROS), or a copy of the stamps where a format has none.
+    columns: by field path. A scalar field is (n,), a fixed array (n, k). ROS and Foxglove conventions: ``header.stamp`` and every
+    time or duration an int64 column of nanoseconds; Vector3 and Point (n, 3); Quaternion (n, 4) in the order x, y, z, w;
+    covariances (n, 9) or (n, 36) row-major; strings an object column. Nested fields keep their dots
+    (``pose.pose.position``, ``twist.twist.linear``, ``status.status``).
+    read: messages found in the file. rejected: messages that could not be decoded, count per reason; read = n + rejected.
+    """
+
+    log_time_ns: Times
+    columns: Mapping[str, np.ndarray]
+    read: int
+    rejected: Mapping[str, int] = field(default_factory=dict)
+
+
+class Log(Protocol):
+    """A log opened for reading. notes: plain sentences on damage found and what was salvaged."""
+
+    path: str
+    format: str
+    notes: tuple[str, ...]
+
+    def channels(self) -> tuple[Channel, ...]:
+        """All channels, in the order of the file."""
+        ...
+
+    def read(self, names: tuple[str, ...]) -> dict[str, Table]:
+        """The tables of the named channels, in one pass over the file. Raises LogError for an unknown name."""
+        ...

@@ -1,0 +1,113 @@
+"""What a filter run can be told: IMU noise, alignment, gating, gaps, output. SI units and radians throughout."""
+
+from dataclasses import dataclass, field
+from math import inf, pi
+from typing import Literal
+
+__all__ = ["GRADES", "AlignmentOptions", "FilterOptions", "GapOptions", "GateOptions", "ImuNoise"]
+
+_DEG = pi / 180
+_DPH = _DEG / 3600
+_MG = 9.80665e-3
+
+
+@dataclass(frozen=True, slots=True)
+class ImuNoise:
+    """Noise model of an IMU, per axis.
+
+    gyro_noise [rad/s/sqrt(Hz)] and accel_noise [m/s^2/sqrt(Hz)] are white-noise densities. gyro_bias_std [rad/s] and
+    accel_bias_std [m/s^2] are turn-on uncertainties. gyro_bias_walk [rad/s/sqrt(s)] and accel_bias_walk [m/s^2/sqrt(s)]
+    drive the biases; with a finite gyro_bias_tau or accel_bias_tau [s] they are first-order Gauss-Markov, else random walks.
+    gyro_scale_std and accel_scale_std are scale-factor uncertainties; where either is positive the filter estimates the
+    scale factors (21 states instead of 15).
+    """
+
+    gyro_noise: float
+    accel_noise: float
+    gyro_bias_std: float
+    accel_bias_std: float
+    gyro_bias_walk: float
+    accel_bias_walk: float
+    gyro_bias_tau: float = inf
+    accel_bias_tau: float = inf
+    gyro_scale_std: float = 0.0
+    accel_scale_std: float = 0.0
+
+
+GRADES: dict[str, ImuNoise] = {
+    "consumer": ImuNoise(0.01 * _DEG, 2.0e-3, 0.5 * _DEG, 30 * _MG, 5e-4 * _DEG, 1e-4 * 9.8 / 10),
+    "industrial": ImuNoise(0.004 * _DEG, 8.0e-4, 0.15 * _DEG, 8 * _MG, 1e-4 * _DEG, 3e-5),
+    "tactical": ImuNoise(0.1 * _DEG / 60, 3.0e-4, 5 * _DPH, 1.5 * _MG, 0.1 * _DPH, 5e-6),
+    "navigation": ImuNoise(0.003 * _DEG / 60, 5.0e-5, 0.02 * _DPH, 0.05 * _MG, 2e-4 * _DPH, 2e-7),
+}
+"""Typical figures by grade, with room for vibration; a data sheet or a static log gives better ones."""
+
+
+@dataclass(frozen=True, slots=True)
+class AlignmentOptions:
+    """Initial attitude. Angles roll, pitch, yaw [rad] of the body in NED.
+
+    method: ``auto`` takes the first of given angles, attitude series, gyrocompass, course that the log allows.
+    given: angles where method is ``given``; given_std their standard deviations. static_window [s]: longest static stretch
+    used for levelling. min_speed [m/s]: GNSS speed from which course counts as heading. course_std [rad]: floor on the standard
+    deviation of a heading from course (side slip, mounting). max_gyrocompass_std [rad]: a worse gyrocompass is not used.
+    """
+
+    method: Literal["auto", "given", "attitude", "gyrocompass", "course"] = "auto"
+    given: tuple[float, float, float] | None = None
+    given_std: tuple[float, float, float] = (1 * _DEG, 1 * _DEG, 3 * _DEG)
+    static_window: float = 60.0
+    min_speed: float = 2.0
+    course_std: float = 3 * _DEG
+    max_gyrocompass_std: float = 2 * _DEG
+
+
+@dataclass(frozen=True, slots=True)
+class GateOptions:
+    """Innovation gate: probability of a good measurement to pass (1.0 switches the gate off); after reset_after rejected
+    epochs in a row the prior covariance is inflated until the next measurement passes (0: never)."""
+
+    probability: float = 0.9999
+    reset_after: int = 10
+
+
+@dataclass(frozen=True, slots=True)
+class GapOptions:
+    """Gaps in the IMU: up to bridge_s they are bridged with the neighbouring samples' mean; longer ones ``reset`` (align
+    anew behind the gap) or are ``refuse``d."""
+
+    bridge_s: float = 0.5
+    longer: Literal["reset", "refuse"] = "reset"
+
+
+@dataclass(frozen=True, slots=True)
+class FilterOptions:
+    """Everything a filter run is told beside the timeline and the method.
+
+    output_rate [Hz] of rows between GNSS epochs (0: only at GNSS epochs). covariance_interval [s]: longest step of the
+    covariance propagation. use_velocity: take GNSS velocity where the log has it. noise_scale multiplies the standard
+    deviations of all GNSS measurements. position_std_floor [m], velocity_std_floor [m/s]: least standard deviations believed.
+    default_position_std, default_velocity_std: (horizontal, vertical) by name of FixStatus where the covariance is unknown.
+    """
+
+    imu_noise: ImuNoise = GRADES["consumer"]
+    alignment: AlignmentOptions = AlignmentOptions()
+    gate: GateOptions = GateOptions()
+    gaps: GapOptions = GapOptions()
+    output_rate: float = 10.0
+    covariance_interval: float = 0.05
+    use_velocity: bool = True
+    noise_scale: float = 1.0
+    position_std_floor: float = 0.01
+    velocity_std_floor: float = 0.02
+    default_position_std: dict[str, tuple[float, float]] = field(
+        default_factory=lambda: {
+            "UNKNOWN": (3.0, 5.0),
+            "SINGLE": (3.0, 5.0),
+            "DIFFERENTIAL": (1.0, 2.0),
+            "FLOAT": (0.3, 0.6),
+            "FIXED": (0.02, 0.04),
+            "DEAD_RECKONING": (10.0, 20.0),
+        }
+    )
+    default_velocity_std: tuple[float, float] = (0.1, 0.2)

@@ -1,0 +1,25 @@
+"""What one processed drive is, before it is written: the hand-over from processing to report, recording and export."""
+
+from dataclasses import dataclass, field
+
+from importers.preflight import Finding
+from navreplay.metrics import Evaluation
+from navreplay.solution import Solution
+from navreplay.timeline import Timeline
+from pipelines.spec import Config
+
+__all__ = ["RunResult"]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class RunResult:
+    """timeline: as imported, before fixes were withheld (reference included). used: what the filter saw. solution: of the IMU,
+    or of `output_point` where the configuration says so. evaluation: None without a reference. timing_s: seconds per stage."""
+
+    config: Config
+    timeline: Timeline
+    used: Timeline
+    solution: Solution
+    evaluation: Evaluation | None
+    findings: tuple[Finding, ...] = ()
+    timing_s: dict[str, float] = field(default_factory=dict)
