@@ -70,7 +70,9 @@ def _check_finite(name: str, column: str, values: Floats) -> None:
 def _check_lla(name: str, lla: Floats) -> None:
     known = lla[np.isfinite(lla[:, 0])]
     if len(known) and (np.abs(known[:, 0]) > np.pi / 2).any():
-        raise LogError(f"{name}: latitude beyond 90 degrees; were latitude and longitude exchanged, or degrees taken for radians?")
+        raise LogError(
+            f"{name}: latitude beyond 90 degrees; were latitude and longitude exchanged, or degrees taken for radians?"
+        )
 
 
 @dataclass(frozen=True, eq=False, slots=True)

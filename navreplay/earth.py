@@ -1,0 +1,132 @@
+"""WGS-84: ellipsoid, normal gravity, rates of the navigation frame, geodetic / Earth-fixed / local coordinates.
+
+Constants and the gravity formula: NGA.STND.0036 (WGS 84, version 1.0.0, 2014). Latitude and longitude [rad], height above
+the ellipsoid [m], Earth-fixed coordinates [m]; everything broadcasts over leading dimensions.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from navreplay.timeline import Floats
+
+__all__ = [
+    "EARTH_RATE",
+    "ECCENTRICITY_SQUARED",
+    "FLATTENING",
+    "GM",
+    "SEMI_MAJOR_AXIS",
+    "earth_rate_n",
+    "ecef_from_lla",
+    "gravity",
+    "lla_from_ecef",
+    "matrix_en",
+    "move_lla",
+    "ned_between",
+    "radii",
+    "transport_rate_n",
+]
+
+SEMI_MAJOR_AXIS = 6378137.0
+"""Semi-major axis a [m]."""
+FLATTENING = 1 / 298.257223563
+ECCENTRICITY_SQUARED = FLATTENING * (2 - FLATTENING)
+EARTH_RATE = 7.292115e-5
+"""Rotation rate [rad/s]."""
+GM = 3.986004418e14
+"""Gravitational constant times the Earth's mass [m^3/s^2]."""
+
+_SEMI_MINOR_AXIS = SEMI_MAJOR_AXIS * (1 - FLATTENING)
+_GRAVITY_EQUATOR = 9.7803253359
+_SOMIGLIANA_K = 1.931852652458e-3
+_M = EARTH_RATE**2 * SEMI_MAJOR_AXIS**2 * _SEMI_MINOR_AXIS / GM
+
+
+def radii(lat: ArrayLike) -> tuple[Floats, Floats]:
+    """Radii of curvature in the meridian and in the prime vertical [m] at latitude (...)."""
+    w2 = 1 - ECCENTRICITY_SQUARED * np.sin(np.asarray(lat, dtype=np.float64)) ** 2
+    normal = SEMI_MAJOR_AXIS / np.sqrt(w2)
+    return normal * (1 - ECCENTRICITY_SQUARED) / w2, normal
+
+
+def gravity(lat: ArrayLike, height: ArrayLike) -> Floats:
+    """Normal gravity, positive down [m/s^2]: Somigliana on the ellipsoid, second order in height (NGA.STND.0036, 4-1, 4-3)."""
+    lat = np.asarray(lat, dtype=np.float64)
+    height = np.asarray(height, dtype=np.float64)
+    s2 = np.sin(lat) ** 2
+    on_ellipsoid = _GRAVITY_EQUATOR * (1 + _SOMIGLIANA_K * s2) / np.sqrt(1 - ECCENTRICITY_SQUARED * s2)
+    ratio = height / SEMI_MAJOR_AXIS
+    return np.asarray(on_ellipsoid * (1 - 2 * (1 + FLATTENING + _M - 2 * FLATTENING * s2) * ratio + 3 * ratio**2))
+
+
+def earth_rate_n(lat: ArrayLike) -> Floats:
+    """Rotation of the Earth in NED [rad/s], (..., 3)."""
+    lat = np.asarray(lat, dtype=np.float64)
+    return np.stack([EARTH_RATE * np.cos(lat), np.zeros_like(lat), -EARTH_RATE * np.sin(lat)], axis=-1)
+
+
+def transport_rate_n(lla: Floats, vel_n: Floats) -> Floats:
+    """Rotation of NED against the Earth [rad/s], (..., 3), of a point at lla (..., 3) that moves with vel_n (..., 3)."""
+    meridian, normal = radii(lla[..., 0])
+    east = vel_n[..., 1] / (normal + lla[..., 2])
+    north = vel_n[..., 0] / (meridian + lla[..., 2])
+    return np.stack([east, -north, -east * np.tan(lla[..., 0])], axis=-1)
+
+
+def ecef_from_lla(lla: Floats) -> Floats:
+    """Earth-fixed coordinates (..., 3) [m] of geodetic ones (..., 3) [rad, rad, m]."""
+    lla = np.asarray(lla, dtype=np.float64)
+    lat, lon, height = lla[..., 0], lla[..., 1], lla[..., 2]
+    _, normal = radii(lat)
+    across = (normal + height) * np.cos(lat)
+    up = (normal * (1 - ECCENTRICITY_SQUARED) + height) * np.sin(lat)
+    return np.stack([across * np.cos(lon), across * np.sin(lon), up], axis=-1)
+
+
+def lla_from_ecef(ecef: Floats) -> Floats:
+    """Geodetic coordinates (..., 3) [rad, rad, m] of Earth-fixed ones (..., 3) [m].
+
+    Bowring's formula in the reduced latitude (Survey Review 28 (1985) 202), iterated: below a nanometre from the Earth's
+    surface to satellites.
+    """
+    ecef = np.asarray(ecef, dtype=np.float64)
+    x, y, z = ecef[..., 0], ecef[..., 1], ecef[..., 2]
+    across = np.hypot(x, y)
+    second_squared = ECCENTRICITY_SQUARED / (1 - ECCENTRICITY_SQUARED)
+    reduced = np.arctan2(z, (1 - FLATTENING) * across)
+    lat = reduced
+    for _ in range(4):
+        lat = np.arctan2(
+            z + second_squared * _SEMI_MINOR_AXIS * np.sin(reduced) ** 3,
+            across - ECCENTRICITY_SQUARED * SEMI_MAJOR_AXIS * np.cos(reduced) ** 3,
+        )
+        reduced = np.arctan2((1 - FLATTENING) * np.sin(lat), np.cos(lat))
+    _, normal = radii(lat)
+    sine, cosine = np.sin(lat), np.cos(lat)
+    height = across * cosine + z * sine - SEMI_MAJOR_AXIS**2 / normal
+    return np.stack([lat, np.arctan2(y, x), height], axis=-1)
+
+
+def matrix_en(lat: ArrayLike, lon: ArrayLike) -> Floats:
+    """C_en (..., 3, 3): projects from NED at latitude, longitude to the Earth-fixed frame."""
+    lat = np.asarray(lat, dtype=np.float64)
+    lon = np.asarray(lon, dtype=np.float64)
+    sl, cl, so, co = np.sin(lat), np.cos(lat), np.sin(lon), np.cos(lon)
+    rows = [[-sl * co, -so, -cl * co], [-sl * so, co, -cl * so], [cl, np.zeros_like(cl), -sl]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def ned_between(origin_lla: Floats, lla: Floats) -> Floats:
+    """Vector from origin_lla (..., 3) to lla (..., 3) in NED at the origin [m], (..., 3); exact (through Earth-fixed)."""
+    origin_lla = np.asarray(origin_lla, dtype=np.float64)
+    difference = ecef_from_lla(lla) - ecef_from_lla(origin_lla)
+    return np.asarray(np.einsum("...ji,...j->...i", matrix_en(origin_lla[..., 0], origin_lla[..., 1]), difference))
+
+
+def move_lla(lla: Floats, offset_n: Floats) -> Floats:
+    """Position (..., 3) offset_n (..., 3) [m, NED] away from lla (..., 3); first order in offset over Earth radius, for offsets
+    of lever arms and filter corrections (an offset of 100 m errs by 1 mm)."""
+    lla = np.asarray(lla, dtype=np.float64)
+    meridian, normal = radii(lla[..., 0])
+    height = lla[..., 2]
+    scale = np.stack([1 / (meridian + height), 1 / ((normal + height) * np.cos(lla[..., 0])), -np.ones_like(height)], axis=-1)
+    return np.asarray(lla + scale * offset_n)
