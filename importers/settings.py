@@ -1,0 +1,202 @@
+"""How logs are read: the ``[input]`` part of a configuration.
+
+Every unit is in the name of its field. What is not set is recognised from the log where that is safe, and told in the
+provenance.
+"""
+
+from datetime import date
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+
+__all__ = [
+    "AttitudeInput",
+    "CsvMapping",
+    "CsvTime",
+    "FixInput",
+    "ImuInput",
+    "InputSettings",
+    "Quantity",
+    "ReferenceInput",
+    "StatusName",
+    "TimeBase",
+]
+
+TimeBase = Literal["auto", "utc", "gps", "tai", "boot"]
+Stamp = Literal["header", "log"]
+StatusName = Literal["unknown", "single", "differential", "float", "fixed", "dead_reckoning", "none"]
+Column = str | Annotated[int, Field(ge=1)]
+Vector = tuple[float, float, float]
+
+Quantity = Literal[
+    "gyro_x",
+    "gyro_y",
+    "gyro_z",
+    "accel_x",
+    "accel_y",
+    "accel_z",
+    "lat",
+    "lon",
+    "height",
+    "ecef_x",
+    "ecef_y",
+    "ecef_z",
+    "vel_n",
+    "vel_e",
+    "vel_d",
+    "vel_u",
+    "vel_ecef_x",
+    "vel_ecef_y",
+    "vel_ecef_z",
+    "std_n",
+    "std_e",
+    "std_d",
+    "std_vn",
+    "std_ve",
+    "std_vd",
+    "roll",
+    "pitch",
+    "yaw",
+    "q_w",
+    "q_x",
+    "q_y",
+    "q_z",
+    "status",
+]
+"""What a column of a text file can hold. ``yaw`` is clockwise from north; ``q_*`` is the quaternion body (FRD) to NED."""
+
+_ALONG = {"f": (1, 0, 0), "b": (-1, 0, 0), "r": (0, 1, 0), "l": (0, -1, 0), "d": (0, 0, 1), "u": (0, 0, -1)}
+
+
+class _Settings(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class ImuInput(_Settings):
+    """The inertial sensor. axes: where its x, y, z point in the vehicle (forward, back, right, left, up, down), right-handed.
+    mounting_deg: roll, pitch, yaw of the so relabelled axes against the vehicle. increments: each sample is the mean over the
+    interval that ends at its stamp. time_offset_s is added to its stamps; with the time base ``boot`` of a text file it is the
+    GPS time, in seconds since 1980-01-06, at which the sensor's clock read zero."""
+
+    channel: str | None = None
+    stamp: Stamp = "header"
+    time_base: TimeBase = "auto"
+    time_offset_s: float = 0.0
+    axes: str = "auto"
+    mounting_deg: Vector = (0.0, 0.0, 0.0)
+    gyro_unit: Literal["auto", "rad/s", "deg/s"] = "auto"
+    accel_unit: Literal["auto", "m/s2", "g"] = "auto"
+    increments: bool = False
+
+    @field_validator("axes")
+    @classmethod
+    def _check_axes(cls, axes: str) -> str:
+        if axes == "auto":
+            return axes
+        if len(axes) != 3 or any(letter not in _ALONG for letter in axes):
+            raise ValueError("axes must be 'auto' or three letters of f, b, r, l, u, d, such as 'flu' or 'frd'")
+        x, y, z = (_ALONG[letter] for letter in axes)
+        cross = (x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0])
+        if cross != z:
+            raise ValueError(f"axes '{axes}' are not a right-handed triad; one of the letters points the wrong way")
+        return axes
+
+
+class FixInput(_Settings):
+    """The GNSS receiver. lever_arm_m: forward, right, down from the IMU to the antenna. height: what the log's heights are
+    above; with ``msl`` geoid_separation_m is added to them. min_status: fixes of a lower kind are rejected."""
+
+    channel: str | None = None
+    velocity_channel: str | None = None
+    stamp: Stamp = "header"
+    time_base: TimeBase = "auto"
+    time_offset_s: float = 0.0
+    lever_arm_m: Vector = (0.0, 0.0, 0.0)
+    height: Literal["ellipsoidal", "msl"] = "ellipsoidal"
+    geoid_separation_m: float | None = None
+    velocity_frame: Literal["auto", "ned", "enu", "ecef"] = "auto"
+    min_status: Literal["unknown", "single", "differential", "float", "fixed"] = "unknown"
+
+    @model_validator(mode="after")
+    def _check_geoid(self) -> "FixInput":
+        if self.height == "msl" and self.geoid_separation_m is None:
+            raise ValueError("height = 'msl' needs geoid_separation_m, the height of the geoid above the ellipsoid there")
+        return self
+
+
+class AttitudeInput(_Settings):
+    """Another attitude sensor, used only where channel names it. convention: ``ros`` is a forward-left-up body in
+    east-north-up, ``ned`` a forward-right-down body in north-east-down."""
+
+    channel: str | None = None
+    time_base: TimeBase = "auto"
+    time_offset_s: float = 0.0
+    convention: Literal["ros", "ned"] = "ros"
+    heading_only: bool = False
+
+
+class ReferenceInput(_Settings):
+    """The reference solution: a file of its own, or a channel of the logs, or (from_fixes) the fixes before any are
+    withheld.
+
+    status: kinds of fixes that count (empty: all). max_speed_jump_mps: rows beside an implied speed above it are dropped.
+    lever_arm_m: forward, right, down from the IMU to the described point. origin_deg_m: latitude [deg], longitude [deg] and
+    height [m] of the origin of a local east-north-up frame (TUM, poses).
+    """
+
+    file: Path | None = None
+    channel: str | None = None
+    from_fixes: bool = False
+    status: tuple[StatusName, ...] = ()
+    max_speed_jump_mps: float | None = Field(default=None, gt=0)
+    lever_arm_m: Vector = (0.0, 0.0, 0.0)
+    time_base: TimeBase = "auto"
+    time_offset_s: float = 0.0
+    convention: Literal["ros", "ned"] = "ros"
+    origin_deg_m: Vector | None = None
+
+
+class CsvTime(_Settings):
+    """Where the time of a row stands. base: ``gps`` counts from 1980-01-06, ``gps_unix`` from 1970 without leap seconds (as
+    RTKLIB does), ``gps_tow`` from the start of the GPS week (week_column, or ``gps_week`` of the input), ``utc`` and ``tai``
+    from 1970, ``boot`` from an unknown zero (see `ImuInput`); ``datetime_*`` is a date and time of day, in one column or
+    several."""
+
+    column: Column | tuple[Column, ...]
+    unit: Literal["s", "ms", "us", "ns"] = "s"
+    base: Literal["gps", "gps_unix", "gps_tow", "utc", "tai", "boot", "datetime_utc", "datetime_gps"] = "gps"
+    week_column: Column | None = None
+
+
+class CsvMapping(_Settings):
+    """Meaning of a text file (or of a matrix in a MATLAB file) without a layout of its own.
+
+    match: pattern of the file's name. columns: by quantity, the name or the number (from 1) of its column. status: by the
+    text of a status column, the kind of fix. variable: name of the matrix in a MATLAB file."""
+
+    match: str
+    role: Literal["imu", "fix", "velocity", "attitude", "reference"]
+    time: CsvTime
+    columns: dict[Quantity, Column] = Field(min_length=1)
+    delimiter: str = "auto"
+    header: Literal["auto"] | bool = "auto"
+    skip_rows: int = Field(default=0, ge=0)
+    comment: Annotated[str, Field(min_length=1, max_length=1)] | None = None
+    angle_unit: Literal["deg", "rad"] = "deg"
+    status: dict[str, StatusName] = Field(default_factory=dict)
+    variable: str | None = None
+
+
+class InputSettings(_Settings):
+    """Everything about the input. leap_seconds: a table in the IERS format replacing the built-in one. gps_week: full week
+    where a file holds only seconds of week. utc_date: date of the first sentence where an NMEA file holds none."""
+
+    leap_seconds: Path | None = None
+    gps_week: int | None = Field(default=None, ge=0)
+    utc_date: date | None = None
+    imu: ImuInput = ImuInput()
+    fix: FixInput = FixInput()
+    attitude: AttitudeInput = AttitudeInput()
+    reference: ReferenceInput = ReferenceInput()
+    csv: tuple[CsvMapping, ...] = ()
