@@ -15,7 +15,7 @@ from navreplay.outages import OutageErrors, assess_outages, find_outages, mark_u
 from navreplay.rotation import matrix_from_quat, quat_conjugate, quat_from_rotvec, quat_multiply, rotvec_from_quat, skew
 from navreplay.solution import Solution
 from navreplay.statistics import Consistency, Statistics, compute_nis, judge_squares, summarise
-from navreplay.timeline import Floats, LogError, Timeline, Times, Trajectory
+from navreplay.timeline import Floats, LogError, Times, Trajectory
 
 __all__ = [
     "Consistency",
@@ -189,25 +189,23 @@ def _select(reference: Trajectory, rows: NDArray[np.bool_]) -> Trajectory:
     )
 
 
-def evaluate(solution: Solution, timeline: Timeline, max_step_s: float = 0.6) -> Evaluation:
-    """The solution (of the IMU) against the timeline's reference, with the solution's outages or, where it names none, those
-    of `find_outages`.
+def evaluate(solution: Solution, reference: Trajectory, lever_b: Floats | None = None, max_step_s: float = 0.6) -> Evaluation:
+    """The solution (of the IMU) against a reference of the point lever_b (3,) [m] from the IMU, body axes.
 
-    Raises LogError when the timeline has no reference or none of its epochs lies in the solution.
+    Judged at the reference's epochs that `interpolate` covers; outages are the solution's own or, where it names none, those
+    of `find_outages`. Raises LogError when no epoch of the reference lies in the solution.
     """
-    if timeline.reference is None:
-        raise LogError("reference: there is none to compare with; give one with --reference")
-    at = interpolate(solution, timeline.reference.t_ns, max_step_s)
+    at = interpolate(solution, reference.t_ns, max_step_s)
     if not at.valid.any():
         raise LogError(
             "reference: no epoch of it lies within the solution; is it of another day, or in another time scale "
             "(UTC taken for GPS)?"
         )
-    reference = _select(timeline.reference, at.valid)
-    errors = _measure_errors(_select_rows(at), reference, timeline.reference_lever_b)
+    reference = _select(reference, at.valid)
+    errors = _measure_errors(_select_rows(at), reference, np.zeros(3) if lever_b is None else lever_b)
     outages = solution.outages or find_outages(solution)
     in_outage = mark_unaided(reference.t_ns, solution, outages)
-    stretches = {"all": np.ones(len(reference), dtype=bool), "outside": ~in_outage, "inside": in_outage}
+    stretches = {"all": np.ones(len(reference), dtype=np.bool_), "outside": ~in_outage, "inside": in_outage}
     return Evaluation(
         t_ns=reference.t_ns,
         errors=errors,

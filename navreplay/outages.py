@@ -16,6 +16,8 @@ __all__ = ["OutageErrors", "assess_outages", "find_outages", "mark_unaided", "su
 _END_TOLERANCE_S = 1.5
 """An outage's end error counts at the last reference epoch within this time before its end."""
 
+_TOLERANCE_NS = 1_000_000
+"""Epochs this close are one: the ends of simulated windows are typed by hand."""
 _UNKNOWN = (float("nan"),) * 4
 
 
@@ -66,7 +68,7 @@ def find_outages(
 def _next_used_time(solution: Solution, outage: Outage) -> int:
     """Of the first fix used after the outage began, or behind the solution where there is none."""
     used = _used_position_times(solution)
-    later = used[used > outage.start_ns]
+    later = used[used > outage.start_ns + _TOLERANCE_NS]
     return int(later[0]) if len(later) else int(solution.t_ns[-1]) + 1
 
 
@@ -74,14 +76,14 @@ def mark_unaided(t_ns: Times, solution: Solution, outages: Iterable[Outage]) -> 
     """(k,) whether t_ns (k,) lies behind the start of an outage and before the next fix that was used."""
     mask = np.zeros(len(t_ns), dtype=np.bool_)
     for outage in outages:
-        mask |= (t_ns > outage.start_ns) & (t_ns < _next_used_time(solution, outage))
+        mask |= (t_ns > outage.start_ns + _TOLERANCE_NS) & (t_ns < _next_used_time(solution, outage))
     return mask
 
 
 def _last_unaided_time(solution: Solution, outage: Outage) -> int:
     """Of the last row that no fix has corrected yet, at most the end of the outage."""
     rows = solution.t_ns[solution.t_ns < _next_used_time(solution, outage)]
-    return min(int(rows[-1]), outage.end_ns) if len(rows) else outage.start_ns
+    return min(int(rows[-1]), outage.end_ns + _TOLERANCE_NS) if len(rows) else outage.start_ns
 
 
 def _travelled(lla: Floats) -> float:
@@ -106,7 +108,7 @@ def assess_outages(
         figures = _UNKNOWN
         if t_ns is not None and error is not None:
             last = _last_unaided_time(solution, outage)
-            rows = np.flatnonzero((t_ns > outage.start_ns) & (t_ns <= last))
+            rows = np.flatnonzero((t_ns > outage.start_ns + _TOLERANCE_NS) & (t_ns <= last))
             figures = _measure_outage(error[rows], bool(len(rows)) and outage.end_ns - t_ns[rows[-1]] <= _END_TOLERANCE_S * 1e9)
         length_s = (outage.end_ns - outage.start_ns) / 1e9
         assessed.append(OutageErrors(outage, length_s, _travelled(path.lla[on_way]), *figures))
