@@ -81,7 +81,7 @@ def load_config(path: str | Path | None, sets: Sequence[str] = ()) -> Config:
     if sets:
         data = apply_sets(data, sets)
     _resolve_paths(data, Path())
-    return validate(_inline_windows(data), "--set" if sets else str(path))
+    return validate(_inline_windows(data), "command line" if sets else str(path))
 
 
 def _read_toml(path: Path) -> dict[str, Any]:
@@ -159,7 +159,8 @@ def validate(data: Mapping[str, Any], source: str) -> Config:
     try:
         return Config.model_validate(data)
     except ValidationError as error:
-        raise LogError(f"{source}: {_describe(error.errors()[0])}") from error
+        unknown_first = sorted(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
+        raise LogError(f"{source}: {_describe(unknown_first[0])}") from error
 
 
 def _describe(error: ErrorDetails) -> str:
@@ -168,6 +169,10 @@ def _describe(error: ErrorDetails) -> str:
         nearest = _nearest(key)
         hint = f"; the nearest valid key is '{nearest}'" if nearest else ""
         return f"unknown key '{key}'{hint}"
+    if error["type"] == "missing":
+        return f"{key} is missing"
+    if error["type"] in {"model_type", "dict_type"}:
+        return f"{key}: expected a section with keys of its own, got {error['input']!r}"
     message = error["msg"].removeprefix("Value error, ").replace("Input should be", "expected")
     if error["type"] == "value_error":
         return f"{key}: {message}"

@@ -1,0 +1,140 @@
+"""The command line. Nothing heavy is imported before a command is known to be wanted and its arguments to be right."""
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from importlib import import_module, metadata
+from pathlib import Path
+
+__all__ = ["main"]
+
+EXPORT_FORMATS = ("tum", "kitti", "csv", "parquet", "kml", "geojson", "pos")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs one command and returns the exit code: 0, 1 for input that cannot be used, 2 for wrong usage, 130 for Ctrl-C."""
+    arguments = _build_parser().parse_args(argv)
+    try:
+        return _run(arguments)
+    except KeyboardInterrupt:
+        print("navreplay: interrupted", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        # The reader of our output has gone; without this the interpreter would complain while it flushes at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    command = import_module(f"pipelines.commands.{arguments.module}")
+    from navreplay.timeline import LogError
+
+    try:
+        command.run(arguments)
+        sys.stdout.flush()
+    except LogError as error:
+        print(f"navreplay: error: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+class _Version(argparse.Action):
+    """Looks the version up only when asked."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        print(f"navreplay {metadata.version('navreplay')}")
+        parser.exit()
+
+
+def _build_parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="navreplay",
+        description="Replays navigation logs: a drive's IMU and GNSS data in; trajectory, accuracy report and recording out.",
+    )
+    parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    for add in (_add_inspect, _add_init, _add_run, _add_compare, _add_synth, _add_export, _add_filters, _add_formats):
+        add(commands)
+    return parser
+
+
+def _add_command(
+    commands: "argparse._SubParsersAction[argparse.ArgumentParser]", name: str, text: str, module: str = ""
+) -> argparse.ArgumentParser:
+    parser = commands.add_parser(name, help=text, description=text[0].upper() + text[1:] + ".")
+    parser.set_defaults(module=module or name)
+    return parser
+
+
+def _add_logs(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("logs", metavar="LOG", nargs="+", type=Path, help="log files (or bag folders); several are merged")
+    parser.add_argument("-c", "--config", metavar="FILE", type=Path, help="configuration in TOML")
+    parser.add_argument(
+        "--set", metavar="KEY=VALUE", action="append", default=[], dest="sets", help="override one key, e.g. imu.grade=tactical"
+    )
+
+
+def _add_json(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--json", action="store_true", help="print the result as JSON on standard output")
+
+
+def _add_out(parser: argparse.ArgumentParser, metavar: str, text: str, required: bool = True) -> None:
+    parser.add_argument("-o", "--out", metavar=metavar, type=Path, required=required, help=text)
+    parser.add_argument("--force", action="store_true", help=f"overwrite {metavar} if it exists")
+
+
+def _add_processing(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--reference", metavar="FILE", type=Path, help="reference solution to compare with")
+    parser.add_argument("--rate", metavar="HZ", type=float, help="rows of the solution between GNSS epochs")
+    parser.add_argument("--quiet", action="store_true", help="no progress bar, no summary")
+    _add_json(parser)
+    _add_out(parser, "OUT", "folder for the results")
+
+
+def _add_inspect(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    parser = _add_command(commands, "inspect", "show channels, rates, gaps, time base and what looks wrong in logs")
+    _add_logs(parser)
+    _add_json(parser)
+
+
+def _add_init(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    parser = _add_command(commands, "init", "write a commented configuration filled with what the logs show")
+    _add_logs(parser)
+    _add_out(parser, "FILE", "configuration to write")
+
+
+def _add_run(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    parser = _add_command(commands, "run", "process a drive: solution, report and recording")
+    _add_logs(parser)
+    parser.add_argument("--filter", metavar="NAME", help="method, see 'navreplay filters'")
+    _add_processing(parser)
+
+
+def _add_compare(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    parser = _add_command(commands, "compare", "process a drive with several methods: one report")
+    _add_logs(parser)
+    parser.add_argument("--filters", metavar="A,B,...", required=True, help="methods, see 'navreplay filters'")
+    _add_processing(parser)
+
+
+def _add_synth(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    parser = _add_command(commands, "synth", "write a synthetic log and its truth")
+    parser.add_argument("scenario", metavar="SCENARIO", help="name of a scenario; 'list' lists them")
+    parser.add_argument("--seed", metavar="N", type=int, default=0, help="seed of all randomness (default 0)")
+    _add_out(parser, "FILE", "log to write; its extension names the format", required=False)
+
+
+def _add_export(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    parser = _add_command(commands, "export", "write the trajectory of a finished run in another format")
+    parser.add_argument("folder", metavar="OUT", type=Path, help="folder written by 'navreplay run'")
+    parser.add_argument("--format", required=True, choices=EXPORT_FORMATS, help="format of the trajectory")
+    _add_out(parser, "FILE", "file to write (default: OUT/trajectory.FORMAT)", required=False)
+
+
+def _add_filters(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    _add_json(_add_command(commands, "filters", "list the methods, a line each"))
+
+
+def _add_formats(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    _add_json(_add_command(commands, "formats", "list the log formats that are read, a line each"))
