@@ -14,7 +14,10 @@ __all__ = [
     "ECCENTRICITY_SQUARED",
     "FLATTENING",
     "GM",
+    "GRAVITY_EQUATOR",
+    "GRAVITY_RATIO",
     "SEMI_MAJOR_AXIS",
+    "SOMIGLIANA_K",
     "earth_rate_n",
     "ecef_from_lla",
     "gravity",
@@ -34,11 +37,13 @@ EARTH_RATE = 7.292115e-5
 """Rotation rate [rad/s]."""
 GM = 3.986004418e14
 """Gravitational constant times the Earth's mass [m^3/s^2]."""
+GRAVITY_EQUATOR = 9.7803253359
+"""Normal gravity on the equator [m/s^2]."""
+SOMIGLIANA_K = 1.931852652458e-3
+GRAVITY_RATIO = EARTH_RATE**2 * SEMI_MAJOR_AXIS**3 * (1 - FLATTENING) / GM
+"""The m = omega^2 a^2 b / GM of the height terms."""
 
 _SEMI_MINOR_AXIS = SEMI_MAJOR_AXIS * (1 - FLATTENING)
-_GRAVITY_EQUATOR = 9.7803253359
-_SOMIGLIANA_K = 1.931852652458e-3
-_M = EARTH_RATE**2 * SEMI_MAJOR_AXIS**2 * _SEMI_MINOR_AXIS / GM
 
 
 def radii(lat: ArrayLike) -> tuple[Floats, Floats]:
@@ -53,9 +58,9 @@ def gravity(lat: ArrayLike, height: ArrayLike) -> Floats:
     lat = np.asarray(lat, dtype=np.float64)
     height = np.asarray(height, dtype=np.float64)
     s2 = np.sin(lat) ** 2
-    on_ellipsoid = _GRAVITY_EQUATOR * (1 + _SOMIGLIANA_K * s2) / np.sqrt(1 - ECCENTRICITY_SQUARED * s2)
+    on_ellipsoid = GRAVITY_EQUATOR * (1 + SOMIGLIANA_K * s2) / np.sqrt(1 - ECCENTRICITY_SQUARED * s2)
     ratio = height / SEMI_MAJOR_AXIS
-    return np.asarray(on_ellipsoid * (1 - 2 * (1 + FLATTENING + _M - 2 * FLATTENING * s2) * ratio + 3 * ratio**2))
+    return np.asarray(on_ellipsoid * (1 - 2 * (1 + FLATTENING + GRAVITY_RATIO - 2 * FLATTENING * s2) * ratio + 3 * ratio**2))
 
 
 def earth_rate_n(lat: ArrayLike) -> Floats:

@@ -1,0 +1,368 @@
+"""IMU-rate work, compiled: arrays in, arrays out. `.py_func` of each kernel is its reference in tests.
+
+Packed state x (22): lat, lon [rad], height [m], v_N, v_E, v_D [m/s], q_nb (4), gyro bias (3) [rad/s], accelerometer bias (3)
+[m/s^2], gyro scale (3), accelerometer scale (3). Error state (15 or 21), true minus computed: position NED [m], velocity NED
+[m/s], rotation vector phi in n with C_nb true = (I + [phi x]) C_nb computed, gyro bias, accelerometer bias (, gyro scale,
+accelerometer scale). Error equations: Groves, Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems,
+2nd ed. (2013), 14.2.4, with this sign of phi and position in metres.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from navreplay import earth
+
+_A = earth.SEMI_MAJOR_AXIS
+_E2 = earth.ECCENTRICITY_SQUARED
+_RATE = earth.EARTH_RATE
+_F = earth.FLATTENING
+_M = earth.GRAVITY_RATIO
+_GE = earth.GRAVITY_EQUATOR
+_K = earth.SOMIGLIANA_K
+
+BRIDGE_ACCEL = 1.0
+"""Specific force [m/s^2] and angular rate [rad/s] that may go unseen while a gap of the IMU is bridged: standard deviations."""
+BRIDGE_RATE = 0.1
+
+
+@njit(cache=True, inline="always")
+def _multiply(pw, px, py, pz, qw, qx, qy, qz):
+    return (
+        pw * qw - px * qx - py * qy - pz * qz,
+        pw * qx + px * qw + py * qz - pz * qy,
+        pw * qy - px * qz + py * qw + pz * qx,
+        pw * qz + px * qy - py * qx + pz * qw,
+    )
+
+
+@njit(cache=True, inline="always")
+def _small_rotation(x, y, z):
+    square = x * x + y * y + z * z
+    if square < 1e-4:  # sine and cosine of half the angle to beyond double precision
+        quarter = square / 4
+        scale = 0.5 * (1 - quarter / 6 * (1 - quarter / 20 * (1 - quarter / 42)))
+        scalar = 1 - quarter / 2 * (1 - quarter / 12 * (1 - quarter / 30 * (1 - quarter / 56)))
+    else:
+        angle = math.sqrt(square)
+        scale = math.sin(angle / 2) / angle
+        scalar = math.cos(angle / 2)
+    return scalar, scale * x, scale * y, scale * z
+
+
+@njit(cache=True)
+def _fill_matrix(w, x, y, z, c):
+    c[0, 0] = 1 - 2 * (y * y + z * z)
+    c[0, 1] = 2 * (x * y - w * z)
+    c[0, 2] = 2 * (x * z + w * y)
+    c[1, 0] = 2 * (x * y + w * z)
+    c[1, 1] = 1 - 2 * (x * x + z * z)
+    c[1, 2] = 2 * (y * z - w * x)
+    c[2, 0] = 2 * (x * z - w * y)
+    c[2, 1] = 2 * (y * z + w * x)
+    c[2, 2] = 1 - 2 * (x * x + y * y)
+
+
+@njit(cache=True)
+def _step(x, dt, dtheta, dvel, c, dv_n, body):
+    """Moves x over one step. c: C_nb, at its start on entry, at its end on return. dv_n: specific force integral in n. body: the step's corrected
+    rotation (3) and velocity increment (3), for the scale-factor columns."""
+    lat, height = x[0], x[2]
+    vn, ve, vd = x[3], x[4], x[5]
+    tx = (dtheta[0] - x[10] * dt) / (1 + x[16])
+    ty = (dtheta[1] - x[11] * dt) / (1 + x[17])
+    tz = (dtheta[2] - x[12] * dt) / (1 + x[18])
+    ux = (dvel[0] - x[13] * dt) / (1 + x[19])
+    uy = (dvel[1] - x[14] * dt) / (1 + x[20])
+    uz = (dvel[2] - x[15] * dt) / (1 + x[21])
+    body[0], body[1], body[2], body[3], body[4], body[5] = tx, ty, tz, ux, uy, uz
+    # rotation of the body during the step
+    bx = ux + 0.5 * (ty * uz - tz * uy)
+    by = uy + 0.5 * (tz * ux - tx * uz)
+    bz = uz + 0.5 * (tx * uy - ty * ux)
+    fx = c[0, 0] * bx + c[0, 1] * by + c[0, 2] * bz
+    fy = c[1, 0] * bx + c[1, 1] * by + c[1, 2] * bz
+    fz = c[2, 0] * bx + c[2, 1] * by + c[2, 2] * bz
+
+    sine, cosine = math.sin(lat), math.cos(lat)
+    w2 = 1 - _E2 * sine * sine
+    root = math.sqrt(w2)
+    normal = _A / root
+    meridian = normal * (1 - _E2) / w2
+    ratio = height / _A
+    g = _GE * (1 + _K * sine * sine) / root * (1 - 2 * (1 + _F + _M - 2 * _F * sine * sine) * ratio + 3 * ratio * ratio)
+    # velocity in the middle of the step, for Coriolis and transport
+    mn, me, md = vn + 0.5 * fx, ve + 0.5 * fy, vd + 0.5 * (fz + g * dt)
+    ien, ied = _RATE * cosine, -_RATE * sine
+    east = me / (normal + height)
+    enn, ene, end = east, -mn / (meridian + height), -east * sine / cosine
+    zx, zy, zz = (ien + enn) * dt, ene * dt, (ied + end) * dt
+    # rotation of the navigation frame during the step
+    gx = fx - 0.5 * (zy * fz - zz * fy)
+    gy = fy - 0.5 * (zz * fx - zx * fz)
+    gz = fz - 0.5 * (zx * fy - zy * fx)
+    dv_n[0], dv_n[1], dv_n[2] = gx, gy, gz
+    rx, ry, rz = 2 * ien + enn, ene, 2 * ied + end
+    new_n = vn + gx - (ry * md - rz * me) * dt
+    new_e = ve + gy - (rz * mn - rx * md) * dt
+    new_d = vd + gz + (g - (rx * me - ry * mn)) * dt
+
+    middle = height - 0.25 * (vd + new_d) * dt
+    new_lat = lat + 0.5 * (vn + new_n) * dt / (meridian + middle)
+    x[1] += 0.5 * (ve + new_e) * dt / ((normal + middle) * math.cos(0.5 * (lat + new_lat)))
+    x[0] = new_lat
+    x[2] = height - 0.5 * (vd + new_d) * dt
+    x[3], x[4], x[5] = new_n, new_e, new_d
+
+    pw, px, py, pz = _small_rotation(tx, ty, tz)
+    qw, qx, qy, qz = _multiply(x[6], x[7], x[8], x[9], pw, px, py, pz)
+    pw, px, py, pz = _small_rotation(-zx, -zy, -zz)
+    qw, qx, qy, qz = _multiply(pw, px, py, pz, qw, qx, qy, qz)
+    scale = 1 / math.sqrt(qw * qw + qx * qx + qy * qy + qz * qz)
+    x[6], x[7], x[8], x[9] = qw * scale, qx * scale, qy * scale, qz * scale
+    _fill_matrix(x[6], x[7], x[8], x[9], c)
+
+
+@njit(cache=True)
+def integrate(start, dt, dtheta, dvel, states):
+    """Mechanisation only: states (k, 22) at the ends of k steps, from start (22)."""
+    x = start.copy()
+    c = np.empty((3, 3))
+    dv_n = np.empty(3)
+    body = np.empty(6)
+    _fill_matrix(x[6], x[7], x[8], x[9], c)
+    for i in range(dt.shape[0]):
+        _step(x, dt[i], dtheta[i], dvel[i], c, dv_n, body)
+        states[i] = x
+
+
+@njit(cache=True)
+def _fill_rate_matrix(x, span, c_dt, dv_n, c_theta, c_dvel, a):
+    """a (9, n): integral of the error dynamics' rows of position, velocity and attitude over span [s]."""
+    n = a.shape[1]
+    a[:, :] = 0
+    lat, height = x[0], x[2]
+    vn, ve, vd = x[3], x[4], x[5]
+    sine, cosine = math.sin(lat), math.cos(lat)
+    tangent = sine / cosine
+    w2 = 1 - _E2 * sine * sine
+    normal = _A / math.sqrt(w2)
+    rm = normal * (1 - _E2) / w2 + height
+    rn = normal + height
+    enn, ene, end = ve / rn, -vn / rm, -ve * tangent / rn
+    ien, ied = _RATE * cosine, -_RATE * sine
+    # position
+    a[0, 0] = -vd / rm * span
+    a[0, 2] = vn / rm * span
+    a[1, 0] = ve * tangent / rm * span
+    a[1, 1] = -(vd / rn + vn * tangent / rm) * span
+    a[1, 2] = ve / rn * span
+    for i in range(3):
+        a[i, 3 + i] = span
+    # changes of the frame rates with position: dlat = dN / rm, dh = -dD
+    die_n, die_d = -_RATE * sine / rm, -_RATE * cosine / rm
+    den_n_down = ve / (rn * rn)
+    den_e_down = -vn / (rm * rm)
+    den_d_north = -ve / (rn * cosine * cosine * rm)
+    den_d_down = -ve * tangent / (rn * rn)
+    # ... and with velocity: den_n / dvE = 1 / rn, den_e / dvN = -1 / rm, den_d / dvE = -tangent / rn
+    # velocity: -(2 die + den) x v, first with position
+    sn, se, sd = 2 * die_n, 0.0, 2 * die_d + den_d_north
+    a[3, 0] = -(se * vd - sd * ve) * span
+    a[4, 0] = -(sd * vn - sn * vd) * span
+    a[5, 0] = -(sn * ve - se * vn) * span
+    sn, se, sd = den_n_down, den_e_down, den_d_down
+    a[3, 2] = -(se * vd - sd * ve) * span
+    a[4, 2] = -(sd * vn - sn * vd) * span
+    a[5, 2] = -(sn * ve - se * vn) * span + 2 * 9.81 / math.sqrt(rm * rn) * span
+    # ... then with velocity: -(2 ie + en) x dv - (den x v)
+    wx, wy, wz = 2 * ien + enn, ene, 2 * ied + end
+    a[3, 3] = vd / rm * span
+    a[3, 4] = (wz - ve * tangent / rn) * span
+    a[3, 5] = -wy * span
+    a[4, 3] = -wz * span
+    a[4, 4] = (vn * tangent + vd) / rn * span
+    a[4, 5] = wx * span
+    a[5, 3] = (wy - vn / rm) * span
+    a[5, 4] = (-wx - ve / rn) * span
+    # velocity with attitude: -[f x] phi
+    a[3, 7] = dv_n[2]
+    a[3, 8] = -dv_n[1]
+    a[4, 6] = -dv_n[2]
+    a[4, 8] = dv_n[0]
+    a[5, 6] = dv_n[1]
+    a[5, 7] = -dv_n[0]
+    # attitude: -dw_in - [w_in x] phi
+    a[6, 0] = -die_n * span
+    a[8, 0] = -(die_d + den_d_north) * span
+    a[6, 2] = -den_n_down * span
+    a[7, 2] = -den_e_down * span
+    a[8, 2] = -den_d_down * span
+    a[6, 4] = -span / rn
+    a[7, 3] = span / rm
+    a[8, 4] = tangent / rn * span
+    zx, zy, zz = ien + enn, ene, ied + end
+    a[6, 7] = zz * span
+    a[6, 8] = -zy * span
+    a[7, 6] = -zz * span
+    a[7, 8] = zx * span
+    a[8, 6] = zy * span
+    a[8, 7] = -zx * span
+    for i in range(3):
+        for j in range(3):
+            a[6 + i, 9 + j] = -c_dt[i, j]
+            a[3 + i, 12 + j] = -c_dt[i, j]
+            if n == 21:
+                a[6 + i, 15 + j] = -c_theta[i, j]
+                a[3 + i, 18 + j] = -c_dvel[i, j]
+
+
+@njit(cache=True)
+def _fill_transition(a, phi):
+    """phi (9, n) = rows of I + a + a^2 / 2."""
+    n = a.shape[1]
+    for i in range(9):
+        for j in range(n):
+            square = 0.0
+            for k in range(9):
+                square += a[i, k] * a[k, j]
+            phi[i, j] = a[i, j] + 0.5 * square
+        phi[i, i] += 1
+
+
+@njit(cache=True)
+def _sandwich(phi, decay, p, work):
+    """p <- F p F' in place, F = [phi; diag(decay)], phi (9, n), decay (n - 9)."""
+    n = p.shape[0]
+    for i in range(9):
+        for j in range(n):
+            total = 0.0
+            for k in range(n):
+                total += phi[i, k] * p[k, j]
+            work[i, j] = total
+    for i in range(9):
+        for j in range(i + 1):
+            total = 0.0
+            for k in range(n):
+                total += work[i, k] * phi[j, k]
+            p[i, j] = total
+            p[j, i] = total
+        for j in range(9, n):
+            p[i, j] = work[i, j] * decay[j - 9]
+            p[j, i] = p[i, j]
+    for i in range(9, n):
+        for j in range(9, n):
+            p[i, j] *= decay[i - 9] * decay[j - 9]
+
+
+@njit(cache=True)
+def _add_noise(p, density, span, bridge):
+    """Adds density (n) times span [s] and what a bridged gap may hide to the diagonal of p."""
+    for i in range(p.shape[0]):
+        p[i, i] += density[i] * span
+    for i in range(3):
+        p[3 + i, 3 + i] += bridge * BRIDGE_ACCEL**2
+        p[6 + i, 6 + i] += bridge * BRIDGE_RATE**2
+
+
+@njit(cache=True)
+def _multiply_left(phi, decay, total, work):
+    """total <- F total in place, F = [phi; diag(decay)]."""
+    n = total.shape[0]
+    for i in range(9):
+        for j in range(n):
+            value = 0.0
+            for k in range(n):
+                value += phi[i, k] * total[k, j]
+            work[i, j] = value
+    total[:9] = work
+    for i in range(9, n):
+        total[i] *= decay[i - 9]
+
+
+@njit(cache=True)
+def propagate(
+    start, p_start, dt, dtheta, dvel, bridged, ends, density, tau, interval, states, covariances, transitions, noises
+):
+    """Mechanisation and covariance over k nodes.
+
+    start (22), p_start (n, n): at the beginning. dt, dtheta, dvel, bridged: steps. ends (k): number of steps up to and with
+    each node, the first counted from 0; consecutive nodes share no step. density (n): white-noise densities. tau (n - 9):
+    correlation times of the sensor errors, inf for random walks. interval [s]: longest covariance step; noise enters half
+    before and half after the transition (trapezoidal rule). Filled: states (k, 22), covariances (k, n, n) and, unless they
+    have no rows, transitions and noises (k, n, n) of the node's whole interval.
+    """
+    n = p_start.shape[0]
+    x = start.copy()
+    p = p_start.copy()
+    a = np.empty((9, n))
+    phi = np.empty((9, n))
+    work = np.empty((9, n))
+    decay = np.ones(n - 9)
+    c = np.empty((3, 3))
+    c_start = np.empty((3, 3))
+    dv_n = np.empty(3)
+    body = np.empty(6)
+    c_dt = np.zeros((3, 3))
+    c_theta = np.zeros((3, 3))
+    c_dvel = np.zeros((3, 3))
+    f_dt = np.zeros(3)
+    keep = transitions.shape[0] > 0
+    fading = np.isfinite(tau).any()
+    total_phi = np.eye(n)
+    total_q = np.zeros((n, n))
+    step = 0
+    _fill_matrix(x[6], x[7], x[8], x[9], c)
+    for node in range(ends.shape[0]):
+        if keep:
+            total_phi[:, :] = 0
+            for i in range(n):
+                total_phi[i, i] = 1
+            total_q[:, :] = 0
+        span = 0.0
+        bridge = 0.0
+        while step < ends[node]:
+            h = dt[step]
+            c_start[:, :] = c
+            _step(x, h, dtheta[step], dvel[step], c, dv_n, body)
+            for i in range(3):
+                f_dt[i] += dv_n[i]
+                for j in range(3):
+                    c_mean = 0.5 * (c_start[i, j] + c[i, j])
+                    c_dt[i, j] += c_mean * h
+                    if n == 21:
+                        c_theta[i, j] += c_mean * body[j]
+                        c_dvel[i, j] += c_mean * body[3 + j]
+            if fading:
+                for i in range(6):
+                    x[10 + i] *= math.exp(-h / tau[i])
+            if bridged[step]:
+                bridge += h * h
+            span += h
+            step += 1
+            if span < interval and step < ends[node]:
+                continue
+            _fill_rate_matrix(x, span, c_dt, f_dt, c_theta, c_dvel, a)
+            _fill_transition(a, phi)
+            for i in range(n - 9):
+                decay[i] = math.exp(-span / tau[i])
+            _add_noise(p, density, span / 2, bridge / 2)
+            _sandwich(phi, decay, p, work)
+            _add_noise(p, density, span / 2, bridge / 2)
+            if keep:
+                _multiply_left(phi, decay, total_phi, work)
+                _add_noise(total_q, density, span / 2, bridge / 2)
+                _sandwich(phi, decay, total_q, work)
+                _add_noise(total_q, density, span / 2, bridge / 2)
+            span = 0.0
+            bridge = 0.0
+            c_dt[:, :] = 0
+            f_dt[:] = 0
+            c_theta[:, :] = 0
+            c_dvel[:, :] = 0
+        states[node] = x
+        covariances[node] = p
+        if keep:
+            transitions[node] = total_phi
+            noises[node] = total_q

@@ -1,0 +1,138 @@
+"""Strapdown inertial navigation: from IMU samples to steps, and from steps to a trajectory in NED.
+
+Corrections for coning and sculling follow Savage, Strapdown Inertial Navigation Integration Algorithm Design, parts 1 and 2
+(JGCD 21 (1998) 19 and 208), with angular rate and specific force linear in time over two samples.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navreplay import _kernels
+from navreplay.timeline import Floats, ImuSeries, LogError, Times, Trajectory
+
+__all__ = ["NavState", "Steps", "find_gaps", "integrate_steps", "make_steps", "mechanise", "split_at_long_gaps"]
+
+GAP_FACTOR = 2.5
+"""An interval beyond this many median intervals is a gap: one lost sample is interpolated without further notice."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Steps:
+    """Body increments from one time to the next, what the mechanisation consumes.
+
+    start_ns: beginning of the first step. t_ns: (k,) end of each step. dt: (k,) [s]. dtheta: (k, 3) rotation vector [rad]
+    with coning. dvel: (k, 3) integral of specific force [m/s] with sculling, in the body axes at the step's start but for the
+    rotation during the step itself. bridged: (k,) True inside a gap of the IMU.
+    """
+
+    start_ns: int
+    t_ns: Times
+    dt: Floats
+    dtheta: Floats
+    dvel: Floats
+    bridged: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return len(self.t_ns)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class NavState:
+    """Position (3,) [rad, rad, m], velocity NED (3,) [m/s], attitude q_nb (4,), gyro bias (3,) [rad/s], accelerometer bias
+    (3,) [m/s^2], scale-factor errors (3,) of gyro and accelerometer [1]."""
+
+    lla: Floats
+    vel_n: Floats
+    q_nb: Floats
+    gyro_bias: Floats
+    accel_bias: Floats
+    gyro_scale: Floats
+    accel_scale: Floats
+
+    @classmethod
+    def at(cls, lla: Floats, vel_n: Floats, q_nb: Floats) -> "NavState":
+        """A state without sensor errors."""
+        return cls(lla, vel_n, q_nb, np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3))
+
+    def pack(self) -> Floats:
+        """(22,) the layout of the kernels."""
+        return np.concatenate(
+            [self.lla, self.vel_n, self.q_nb, self.gyro_bias, self.accel_bias, self.gyro_scale, self.accel_scale]
+        )
+
+    @classmethod
+    def unpack(cls, x: Floats) -> "NavState":
+        """The inverse of `pack`; x (22,)."""
+        return cls(x[0:3], x[3:6], x[6:10], x[10:13], x[13:16], x[16:19], x[19:22])
+
+
+def find_gaps(t_ns: Times) -> NDArray[np.bool_]:
+    """(n - 1,) True for the intervals of a time column (n,) that are gaps."""
+    dt = np.diff(t_ns)
+    return dt > GAP_FACTOR * np.median(dt)
+
+
+def make_steps(imu: ImuSeries, cut_ns: Times) -> Steps:
+    """Steps between all IMU stamps, cut further at the times cut_ns (any order; those outside the IMU's span are ignored).
+
+    A cut inside an interval divides its increments in proportion to time. Across a gap an integrating sensor's mean is taken
+    as the mean of the two samples about the gap.
+    """
+    if len(imu) < 2:
+        raise LogError("imu: one sample is not enough to navigate")
+    dt, dtheta, dvel, bridged = _interval_increments(imu)
+    inside = cut_ns[(cut_ns > imu.t_ns[0]) & (cut_ns < imu.t_ns[-1])]
+    ends = np.unique(np.concatenate([imu.t_ns[1:], inside]))
+    interval = np.searchsorted(imu.t_ns[1:], ends)
+    pieces = np.diff(ends, prepend=imu.t_ns[0]) / 1e9
+    share = (pieces / dt[interval])[:, None]
+    return Steps(int(imu.t_ns[0]), ends, pieces, dtheta[interval] * share, dvel[interval] * share, bridged[interval])
+
+
+def _interval_increments(imu: ImuSeries) -> tuple[Floats, Floats, Floats, NDArray[np.bool_]]:
+    dt = np.diff(imu.t_ns) / 1e9
+    bridged = find_gaps(imu.t_ns)
+    gyro, gyro_slope = _means_and_slopes(imu.gyro, dt, imu.increments, bridged)
+    accel, accel_slope = _means_and_slopes(imu.accel, dt, imu.increments, bridged)
+    cube = (dt**3 / 12)[:, None]
+    coning = cube * np.cross(gyro, gyro_slope)
+    sculling = cube * (np.cross(gyro, accel_slope) - np.cross(gyro_slope, accel))
+    return dt, gyro * dt[:, None] + coning, accel * dt[:, None] + sculling, bridged
+
+
+def _means_and_slopes(samples: Floats, dt: Floats, increments: bool, bridged: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+    middle = (samples[1:] + samples[:-1]) / 2
+    if increments:
+        mean = np.where(bridged[:, None], middle, samples[1:])
+        apart = (dt + np.concatenate([dt[:1], dt[:-1]])) / 2
+    else:
+        mean = middle
+        apart = dt
+    slope = np.diff(samples, axis=0) / apart[:, None]
+    slope[bridged] = 0
+    return mean, slope
+
+
+def integrate_steps(steps: Steps, start: NavState) -> Floats:
+    """(k, 22) packed states at the ends of the steps, from start at the beginning of the first."""
+    states = np.empty((len(steps), 22))
+    _kernels.integrate(start.pack(), steps.dt, steps.dtheta, steps.dvel, states)
+    return states
+
+
+def mechanise(imu: ImuSeries, start: NavState) -> Trajectory:
+    """Unaided navigation from start at the first stamp: states at all later stamps."""
+    steps = make_steps(imu, np.empty(0, dtype=np.int64))
+    x = integrate_steps(steps, start)
+    unknown = np.full((len(steps), 3, 3), np.nan)
+    return Trajectory(steps.t_ns, x[:, 0:3].copy(), x[:, 3:6].copy(), x[:, 6:10].copy(), unknown)
+
+
+def split_at_long_gaps(imu: ImuSeries, longest_ns: int) -> list[ImuSeries]:
+    """The pieces of imu between gaps longer than longest_ns; a piece of a single sample is dropped."""
+    cuts = np.flatnonzero(np.diff(imu.t_ns) > longest_ns) + 1
+    edges = [0, *cuts.tolist(), len(imu)]
+    return [ImuSeries(imu.t_ns[a:b], imu.gyro[a:b], imu.accel[a:b], imu.increments) for a, b in pairwise(edges) if b - a > 1]
