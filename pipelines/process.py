@@ -67,7 +67,7 @@ def filter_drive(drive: Drive, config: Config, progress: Progress | None = None)
         solution = run_filter(used, method, filter_options(config), tell)
     with _stage("evaluating", timing, progress):
         solution = replace(solution, outages=find_outages(solution, _simulated_windows(timeline, config)))
-        evaluation = None if timeline.reference is None else evaluate(solution, timeline)
+        evaluation = None if timeline.reference is None else evaluate(solution, timeline.reference, timeline.reference_lever_b)
     return RunResult(config, timeline, used, _at_output_point(solution, used, config), evaluation, drive.findings, timing)
 
 

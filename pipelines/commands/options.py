@@ -1,0 +1,16 @@
+"""From command-line arguments to a configuration."""
+
+import argparse
+import json
+
+from pipelines.spec import Config, load_config
+
+__all__ = ["read_config"]
+
+
+def read_config(arguments: argparse.Namespace) -> Config:
+    """The configuration file with ``--filter``, ``--rate``, ``--reference`` and ``--set`` on top of it, in this order."""
+    shortcuts = (("filter.name", "filter"), ("output.rate_hz", "rate"), ("input.reference.file", "reference"))
+    given = ((key, getattr(arguments, option, None)) for key, option in shortcuts)
+    sets = [f"{key}={json.dumps(value, default=str)}" for key, value in given if value is not None]
+    return load_config(arguments.config, [*sets, *arguments.sets])

@@ -1,0 +1,28 @@
+"""``navreplay run``: one drive, one method; solution, report and recording."""
+
+import argparse
+import json
+
+from pipelines.commands.options import read_config
+from pipelines.destination import check_folder
+from pipelines.outputs import write_outputs
+from pipelines.process import process
+from pipelines.progress import show_progress
+from pipelines.summary import describe_outputs, headline_figures, summarise_run
+
+__all__ = ["run"]
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Processes the logs and writes OUT. Raises LogError for anything the user has to change."""
+    config = read_config(arguments)
+    check_folder(arguments.out, arguments.force)
+    with show_progress(arguments.quiet or arguments.json) as progress:
+        result = process(arguments.logs, config, progress)
+        if progress is not None:
+            progress("writing", 0.0)
+        outputs = write_outputs(result, arguments.out)
+    if arguments.json:
+        print(json.dumps(headline_figures(result) | {"outputs": {name: str(path) for name, path in outputs.items()}}, indent=2))
+    elif not arguments.quiet:
+        print("\n".join(summarise_run(result) + describe_outputs(outputs)))
