@@ -1,0 +1,28 @@
+"""Synthetic logs with a known truth: smooth motion, ideal IMU, sensor errors, scenarios by name, writers.
+
+log = simulate(SCENARIOS["car-city"], seed=1)
+write(log, "city.mcap")
+"""
+
+from synthetic_logs.gnss import GnssErrors
+from synthetic_logs.imu_errors import ImuErrors
+from synthetic_logs.motion import Motion
+from synthetic_logs.scenarios import SCENARIOS
+from synthetic_logs.simulation import Journey, Scenario, SyntheticLog, ideal_imu, simulate, truth_at, with_duration
+from synthetic_logs.writers import FORMATS, write
+
+__all__ = [
+    "FORMATS",
+    "SCENARIOS",
+    "GnssErrors",
+    "ImuErrors",
+    "Journey",
+    "Motion",
+    "Scenario",
+    "SyntheticLog",
+    "ideal_imu",
+    "simulate",
+    "truth_at",
+    "with_duration",
+    "write",
+]
