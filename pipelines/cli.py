@@ -122,7 +122,7 @@ def _add_synth(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser = _add_command(commands, "synth", "write a synthetic log and its truth")
     parser.add_argument("scenario", metavar="SCENARIO", help="name of a scenario; 'list' lists them")
     parser.add_argument("--seed", metavar="N", type=int, default=0, help="seed of all randomness (default 0)")
-    _add_out(parser, "FILE", "log to write; its extension names the format", required=False)
+    parser.add_argument("-o", "--out", metavar="FILE", type=Path, help="log to write; its extension names the format")
 
 
 def _add_export(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -138,3 +138,7 @@ def _add_filters(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 def _add_formats(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     _add_json(_add_command(commands, "formats", "list the log formats that are read, a line each"))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -4,7 +4,6 @@ import argparse
 import difflib
 
 from navreplay.timeline import LogError
-from pipelines.destination import check_file
 from synthetic_logs.scenarios import SCENARIOS
 from synthetic_logs.simulation import simulate
 from synthetic_logs.writers import write
@@ -24,7 +23,5 @@ def run(arguments: argparse.Namespace) -> None:
         raise LogError(f"unknown scenario '{arguments.scenario}'; the nearest is '{nearest}'; 'navreplay synth list' lists all")
     if arguments.out is None:
         raise LogError("synth: name the file to write with -o; its extension names the format, for example -o drive.mcap")
-    check_file(arguments.out, arguments.force)
-    arguments.out.parent.mkdir(parents=True, exist_ok=True)
     for path in write(simulate(SCENARIOS[arguments.scenario], arguments.seed), arguments.out):
         print(path)
