@@ -1,0 +1,221 @@
+"""The tables of a report, taken from its plain data; Markdown and HTML only set them."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from pipelines.report import Report
+
+__all__ = ["Figure", "Table", "figure_text", "headline_figures", "report_tables"]
+
+_STRETCHES = {"all": "whole drive", "outside": "outside outages", "inside": "inside outages"}
+_STATISTICS = ("rms", "mean", "std", "p50", "p68", "p95", "max", "count")
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A headline figure: what it is, its value with unit, and a word of context (may be empty)."""
+
+    name: str
+    value: str
+    context: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table of texts. note: one sentence below it (may be empty)."""
+
+    title: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    note: str = ""
+
+
+def figure_text(value: float | None, unit: str = "") -> str:
+    """A figure to three significant digits; a dash for an unknown one."""
+    if value is None:
+        return "–"
+    if isinstance(value, int):
+        text = str(value)
+    else:
+        text = f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}" if abs(value) >= 1e-3 or value == 0 else f"{value:.1e}"
+    return f"{text} {unit}".strip()
+
+
+def _duration_text(seconds: float) -> str:
+    minutes, second = divmod(round(seconds), 60)
+    return f"{minutes} min {second:02d} s" if minutes else f"{seconds:.1f} s"
+
+
+def headline_figures(report: Report) -> tuple[Figure, ...]:
+    """What a reader looks for first."""
+    drive = report["drive"]
+    distance = f"{drive['distance_m'] / 1000:.2f} km"
+    figures = [Figure("Drive", _duration_text(drive["duration_s"]), f"{distance}, method {drive['method']}")]
+    errors = report["errors"]
+    if errors is not None:
+        stretch = "outside" if report["outages"]["count"] and errors["outside"]["position"]["horizontal"]["count"] else "all"
+        position = errors[stretch]["position"]
+        words = _STRETCHES[stretch]
+        for name, component in (("Horizontal error", "horizontal"), ("Height error", "down")):
+            p95 = figure_text(position[component]["p95"], "m")
+            figures.append(Figure(f"{name} RMS", figure_text(position[component]["rms"], "m"), f"{words}; 95 % {p95}"))
+    figures += _outage_figures(report["outages"])
+    if errors is not None and "attitude" in errors["all"]:
+        figures.append(
+            Figure("Heading error RMS", figure_text(errors["all"]["attitude"]["heading"]["rms"], "deg"), "whole drive")
+        )
+    if report["nees"] is not None:
+        nees = report["nees"]["position"]
+        inside = f"3 expected; {_percent(nees['share_below_upper'])} below the 97.5 % bound"
+        figures.append(Figure("Position NEES", figure_text(nees["mean"]), inside))
+    for kind, innovation in report["innovations"].items():
+        used = f"{innovation['used']} of {innovation['read']}"
+        figures.append(Figure(f"{kind.capitalize()} updates used", used, _reasons(innovation["rejected"])))
+    return tuple(figures)
+
+
+def _outage_figures(outages: Mapping[str, Any]) -> list[Figure]:
+    summary = outages["summary"]["end_horizontal"]
+    if not outages["count"]:
+        return []
+    if not summary["count"]:
+        longest = max(outage["length_s"] for outage in outages["list"])
+        return [Figure("Outages", str(outages["count"]), f"longest {longest:.0f} s")]
+    context = f"median of {summary['count']} outages; 95 % {figure_text(summary['p95'], 'm')}"
+    return [Figure("Horizontal error at outage end", figure_text(summary["p50"], "m"), context)]
+
+
+def _percent(share: float | None) -> str:
+    return "–" if share is None else f"{100 * share:.1f} %"
+
+
+def _reasons(rejected: Mapping[str, int]) -> str:
+    return ", ".join(f"{count} {reason}" for reason, count in rejected.items())
+
+
+def report_tables(report: Report) -> tuple[Table, ...]:
+    """All tables in the order of a report."""
+    tables: list[Table] = []
+    if report["errors"] is not None:
+        tables += _error_tables(report["errors"])
+    tables += _outage_tables(report["outages"])
+    tables.append(_consistency_table(report))
+    if report["within_3_sigma"] is not None:
+        tables.append(_coverage_table(report["within_3_sigma"]))
+    if report["innovations"]:
+        tables.append(_innovation_table(report["innovations"]))
+    tables.append(_channel_table(report["channels"]))
+    tables += _text_tables(report)
+    return tuple(tables)
+
+
+def _error_tables(errors: Mapping[str, Any]) -> list[Table]:
+    tables = []
+    for quantity, first in errors["all"].items():
+        rows = []
+        for stretch, words in _STRETCHES.items():
+            table = errors[stretch][quantity]
+            for component, figures in table.items():
+                if component != "unit" and figures["count"]:
+                    rows.append((words, component, *(figure_text(figures[name]) for name in _STATISTICS)))
+        title = f"{quantity.capitalize()} error [{first['unit']}]"
+        tables.append(
+            Table(
+                title, ("", "component", *_STATISTICS), tuple(rows), "Estimated minus reference; percentiles of the magnitude."
+            )
+        )
+    return tables
+
+
+def _outage_tables(outages: Mapping[str, Any]) -> list[Table]:
+    if not outages["count"]:
+        return []
+    names = ("end_horizontal_m", "end_3d_m", "max_horizontal_m", "max_3d_m")
+    rows = [
+        (
+            str(number),
+            outage["start_utc"].partition("T")[2][:10],
+            figure_text(outage["length_s"], "s"),
+            figure_text(outage["distance_m"], "m"),
+            *(figure_text(outage[name]) for name in names),
+            "simulated" if outage["simulated"] else "",
+        )
+        for number, outage in enumerate(outages["list"], start=1)
+    ]
+    for share in ("p50", "p95"):
+        figures = (figure_text(outages["summary"][name.removesuffix("_m")][share]) for name in names)
+        rows.append(("median" if share == "p50" else "95 %", "", "", "", *figures, ""))
+    header = ("", "start UTC", "length", "distance", "end horizontal", "end 3-D", "largest horizontal", "largest 3-D", "")
+    return [Table("Outages [m]", header, tuple(rows), "Errors at the end are those before the next fix corrects.")]
+
+
+def _consistency_table(report: Report) -> Table:
+    judged = [(f"NEES {name}", values) for name, values in (report["nees"] or {}).items()]
+    judged += [(f"NIS {name}", values) for name, values in report["nis"].items()]
+    rows = tuple(
+        (
+            name,
+            figure_text(values["dof"]),
+            figure_text(values["mean"]),
+            f"{values['lower']:.3g} to {values['upper']:.3g}",
+            _percent(values["share_inside"]),
+            _percent(values["share_below_upper"]),
+            figure_text(values["count"]),
+        )
+        for name, values in judged
+    )
+    header = ("", "expected", "mean", "95 % bounds", "inside", "below the upper", "epochs")
+    return Table("Consistency", header, rows, "Inside the bounds 95 % are expected, below the upper one 97.5 %.")
+
+
+def _coverage_table(within: Mapping[str, Mapping[str, float]]) -> Table:
+    rows = tuple((quantity, label, _percent(share)) for quantity, shares in within.items() for label, share in shares.items())
+    return Table("Errors within 3 sigma", ("", "component", "share"), rows, "99.7 % are expected.")
+
+
+def _innovation_table(innovations: Mapping[str, Any]) -> Table:
+    rows = []
+    for kind, series in innovations.items():
+        for label, component in series["components"].items():
+            rows.append(
+                (
+                    kind,
+                    label,
+                    figure_text(component["residual"]["rms"], series["unit"]),
+                    figure_text(component["residual"]["mean"], series["unit"]),
+                    figure_text(component["normalised"]["rms"]),
+                    figure_text(component["noise_over_nominal"]["p50"]),
+                    f"{series['used']} of {series['read']}",
+                    _reasons(series["rejected"]),
+                )
+            )
+    header = ("", "component", "rms", "mean", "rms in sigma", "noise used over told", "used", "rejected")
+    return Table(
+        "Innovations", header, tuple(rows), "Of the measurements used; 1 sigma is expected; the noise ratio is a median."
+    )
+
+
+def _channel_table(channels: Sequence[Mapping[str, Any]]) -> Table:
+    rows = tuple(
+        (c["name"], c["role"], c["type"], str(c["read"]), str(c["used"]), str(c["read"] - c["used"]), _reasons(c["rejected"]))
+        for c in channels
+    )
+    return Table(
+        "Channels", ("channel", "role", "type", "read", "used", "rejected", "reasons"), rows, "Read = used + rejected."
+    )
+
+
+def _text_tables(report: Report) -> list[Table]:
+    findings = tuple((f["level"], f["text"], f["hint"]) for f in report["findings"])
+    events = tuple((e["utc"].partition("T")[2][:10], e["level"], e["text"]) for e in report["events"][:200])
+    files = tuple((f["path"], f["format"], str(f["size"]), f["sha256"]) for f in report["files"])
+    more = len(report["events"]) - len(events)
+    tables = [
+        Table("Findings", ("level", "finding", "what to do"), findings),
+        Table("Assumptions", ("assumed or converted on the way",), tuple((text,) for text in report["assumptions"])),
+        Table("Events", ("UTC", "level", "event"), events, f"{more} more are in report.json." if more else ""),
+        Table("Files", ("file", "format", "bytes", "SHA-256"), files),
+        Table("Time spent", ("stage", "seconds"), tuple((k, figure_text(v)) for k, v in report["timing_s"].items())),
+    ]
+    return [table for table in tables if table.rows]
