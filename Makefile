@@ -23,12 +23,12 @@ clean:
 # The installation is editable, so only a change of the requirements calls for another one.
 .venv/.installed: pyproject.toml | .venv
 	@echo "Installing navreplay and what it needs into .venv ..."
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
+	$(BIN)/python -m pip install -qq --disable-pip-version-check -e .
 	touch $@
 
 .venv/.tested: pyproject.toml | .venv
 	@echo "Installing navreplay and what its tests need into .venv ..."
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[test]"
+	$(BIN)/python -m pip install -qq --disable-pip-version-check -e ".[test]"
 	touch $@ .venv/.installed
 
 .venv:

@@ -2,13 +2,18 @@
 
 import json
 import math
+import re
 import tomllib
+from pathlib import Path
 
 import pytest
 
 from navreplay.options import GRADES, FilterOptions
 from navreplay.timeline import LogError
 from pipelines.spec import Config, apply_sets, config_keys, dump_toml, filter_options, load_config, validate
+from pipelines.template import commented_template
+
+ROOT = Path(__file__).parents[1]
 
 
 def write(path, text):
@@ -164,3 +169,33 @@ def test_a_mistake_on_the_command_line_is_told_as_such():
     assert error_of(None, "imu.grad=tactical").startswith("command line: unknown key 'imu.grad'")
     assert "expected KEY=VALUE" in error_of(None, "imu.grade")
     assert "imu is a value, not a section" in error_of(None, "imu=1", "imu.grade=tactical")
+
+
+def test_the_template_loads_to_the_configuration_it_was_made_of(tmp_path):
+    config = load_config(
+        None,
+        [
+            "input.imu.channel=/imu",
+            "input.utc_date=2025-07-08",
+            'input.csv=[{match = "*.csv", role = "imu", time = {column = 1}, columns = {gyro_x = 2, "accel_x" = "a x"}}]',
+            "filter.parameters={threshold = 1.5}",
+            "imu.gyro_bias_tau_s=inf",
+            "outages.windows_gps_tow=[[1, 2.5]]",
+        ],
+    )
+    text = commented_template(config, ["A note."])
+    assert text.startswith("# A note.\n")
+    assert load_config(write(tmp_path / "drive.toml", text)) == config
+
+
+def test_the_template_explains_every_section_and_shows_every_key():
+    text = commented_template(Config())
+    sections = [line for line in text.splitlines() if line.startswith("[")]
+    assert all(" # " in line for line in sections)
+    for key in config_keys():
+        if not key.startswith("input.csv."):
+            assert re.search(rf"^(# )?{key.rpartition('.')[2]} = ", text, re.MULTILINE), key
+
+
+def test_the_documentation_shows_the_template():
+    assert f"```toml\n{commented_template(Config())}```\n" in (ROOT / "docs/configuration.md").read_text(encoding="utf-8")

@@ -1,0 +1,20 @@
+"""``navreplay formats``: what logs can be read from, a line each."""
+
+import argparse
+import json
+
+from importers.formats import FORMATS
+
+__all__ = ["run"]
+
+
+def run(arguments: argparse.Namespace) -> None:
+    """Prints name, extensions and description of every format."""
+    if arguments.json:
+        formats = {known.name: {"extensions": known.extensions, "description": known.description} for known in FORMATS}
+        print(json.dumps(formats, indent=2))
+        return
+    width = max(len(known.name) for known in FORMATS)
+    for known in FORMATS:
+        extensions = f" ({', '.join(known.extensions)})" if known.extensions else ""
+        print(f"{known.name:<{width}}  {known.description}{extensions}")
