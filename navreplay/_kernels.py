@@ -66,8 +66,8 @@ def _fill_matrix(w, x, y, z, c):
 
 @njit(cache=True)
 def _step(x, dt, dtheta, dvel, c, dv_n, body):
-    """Moves x over one step. c: C_nb, at its start on entry, at its end on return. dv_n: specific force integral in n. body: the step's corrected
-    rotation (3) and velocity increment (3), for the scale-factor columns."""
+    """Moves x over one step. c: C_nb, at its start on entry, at its end on return. dv_n: specific force integral in n. body:
+    the step's corrected rotation (3) and velocity increment (3), for the scale-factor columns."""
     lat, height = x[0], x[2]
     vn, ve, vd = x[3], x[4], x[5]
     tx = (dtheta[0] - x[10] * dt) / (1 + x[16])

@@ -47,13 +47,14 @@ GRADES: dict[str, ImuNoise] = {
 class AlignmentOptions:
     """Initial attitude. Angles roll, pitch, yaw [rad] of the body in NED.
 
-    method: ``auto`` takes the first of given angles, attitude series, gyrocompass, course that the log allows.
-    given: angles where method is ``given``; given_std their standard deviations. static_window [s]: longest static stretch
-    used for levelling. min_speed [m/s]: GNSS speed from which course counts as heading. course_std [rad]: floor on the standard
-    deviation of a heading from course (side slip, mounting). max_gyrocompass_std [rad]: a worse gyrocompass is not used.
+    method: ``auto`` takes the first of given angles, attitude series, gyrocompass, course that the log allows; ``reference``
+    (never taken by itself) takes roll, pitch and yaw of the reference. given: angles where method is ``given``; given_std
+    their standard deviations. static_window [s]: longest static stretch used for levelling. min_speed [m/s]: GNSS speed from
+    which course counts as heading. course_std [rad]: floor on the standard deviation of a heading from course (side slip,
+    mounting). max_gyrocompass_std [rad]: a worse gyrocompass is not used.
     """
 
-    method: Literal["auto", "given", "attitude", "gyrocompass", "course"] = "auto"
+    method: Literal["auto", "given", "attitude", "reference", "gyrocompass", "course"] = "auto"
     given: tuple[float, float, float] | None = None
     given_std: tuple[float, float, float] = (1 * _DEG, 1 * _DEG, 3 * _DEG)
     static_window: float = 60.0

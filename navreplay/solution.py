@@ -26,9 +26,8 @@ class InnovationSeries:
 
     kind: ``position``, ``velocity``, ``heading``, ... labels: one per component, e.g. ``north``. unit: of the residuals.
     t_ns: (k,). residual: (k, m). std: (k, m) square root of the diagonal of S. noise_std: (k, m) square root of the
-    diagonal of the R that was used, nominal_std: (k, m) of the R that was told. nis: (k,) residual' S^-1 residual with the
-    S before adaptation of R by this very residual where the method separates the two. used: (k,) bool. reason: k phrases,
-    empty where used.
+    diagonal of the R that was used, nominal_std: (k, m) of the R that was told. nis: (k,) residual' S^-1 residual with the R
+    that was used. used: (k,) bool. reason: k phrases, empty where used.
     """
 
     kind: str

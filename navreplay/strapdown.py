@@ -38,6 +38,11 @@ class Steps:
     def __len__(self) -> int:
         return len(self.t_ns)
 
+    def after(self, t_ns: int) -> "Steps":
+        """The steps that begin at or after t_ns, which must be an end of a step or the beginning of the first."""
+        rest = slice(int(np.searchsorted(self.t_ns, t_ns, side="right")), None)
+        return Steps(t_ns, self.t_ns[rest], self.dt[rest], self.dtheta[rest], self.dvel[rest], self.bridged[rest])
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class NavState:

@@ -143,12 +143,12 @@ class GnssFixSeries:
     @property
     def has_position(self) -> NDArray[np.bool_]:
         """(n,) rows whose position is known."""
-        return np.isfinite(self.lla).all(axis=1)
+        return np.asarray(np.isfinite(self.lla).all(axis=1))
 
     @property
     def has_velocity(self) -> NDArray[np.bool_]:
         """(n,) rows whose velocity is known."""
-        return np.isfinite(self.vel_n).all(axis=1)
+        return np.asarray(np.isfinite(self.vel_n).all(axis=1))
 
 
 @dataclass(frozen=True, eq=False, slots=True)

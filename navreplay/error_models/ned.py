@@ -1,0 +1,135 @@
+"""Error state in NED with 15 or, with scale factors, 21 elements: layout, noise, initial covariance, retraction, propagation.
+
+The equations themselves are in `navreplay._kernels`, which also states the sign of each element.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from navreplay import _kernels, earth, rotation
+from navreplay.options import ImuNoise
+from navreplay.strapdown import NavState, Steps
+from navreplay.timeline import Floats
+
+__all__ = ["ACCEL_BIAS", "ATTITUDE", "GYRO_BIAS", "POSITION", "VELOCITY", "NedErrorModel", "Propagated"]
+
+POSITION = slice(0, 3)
+VELOCITY = slice(3, 6)
+ATTITUDE = slice(6, 9)
+GYRO_BIAS = slice(9, 12)
+ACCEL_BIAS = slice(12, 15)
+
+_NAMES = (
+    *("position_n", "position_e", "position_d", "velocity_n", "velocity_e", "velocity_d"),
+    *("attitude_n", "attitude_e", "attitude_d", "gyro_bias_x", "gyro_bias_y", "gyro_bias_z"),
+    *("accel_bias_x", "accel_bias_y", "accel_bias_z", "gyro_scale_x", "gyro_scale_y", "gyro_scale_z"),
+    *("accel_scale_x", "accel_scale_y", "accel_scale_z"),
+)
+_UNITS = tuple(unit for unit in ("m", "m/s", "rad", "rad/s", "m/s^2", "1", "1") for _ in range(3))
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Propagated:
+    """States (k, 22) and covariances (k, n, n) at k nodes; transitions and noises (k, n, n) from the node before to each, or
+    without rows where they were not asked for."""
+
+    states: Floats
+    covariances: Floats
+    transitions: Floats
+    noises: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class NedErrorModel:
+    """The error model for one IMU noise description."""
+
+    noise: ImuNoise
+
+    @property
+    def size(self) -> int:
+        """Number of error states n: 21 where scale factors are estimated, else 15."""
+        return 21 if self.noise.gyro_scale_std > 0 or self.noise.accel_scale_std > 0 else 15
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """(n,) names of the error states."""
+        return _NAMES[: self.size]
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """(n,) units of the error states."""
+        return _UNITS[: self.size]
+
+    def density(self) -> Floats:
+        """(n,) densities of the driving white noise, in state units squared per second."""
+        per_axis = [
+            0.0,
+            self.noise.accel_noise,
+            self.noise.gyro_noise,
+            self.noise.gyro_bias_walk,
+            self.noise.accel_bias_walk,
+            0,
+            0,
+        ]
+        return np.repeat(np.square(per_axis), 3)[: self.size]
+
+    def correlation_time(self) -> Floats:
+        """(n - 9,) correlation times of the sensor errors [s]."""
+        return np.repeat([self.noise.gyro_bias_tau, self.noise.accel_bias_tau, np.inf, np.inf], 3)[: self.size - 9]
+
+    def initial_covariance(self, cov_pos: Floats, cov_vel: Floats, cov_att: Floats) -> Floats:
+        """(n, n) from covariances (3, 3) of position [m^2], velocity [m^2/s^2] and attitude [rad^2]; sensor errors as told."""
+        cov = np.zeros((self.size, self.size))
+        cov[POSITION, POSITION] = cov_pos
+        cov[VELOCITY, VELOCITY] = cov_vel
+        cov[ATTITUDE, ATTITUDE] = cov_att
+        stds = [self.noise.gyro_bias_std, self.noise.accel_bias_std, self.noise.gyro_scale_std, self.noise.accel_scale_std]
+        sensor = np.repeat(np.square(stds), 3)[: self.size - 9]
+        cov[range(9, self.size), range(9, self.size)] = sensor
+        return cov
+
+    def retract(self, state: NavState, correction: Floats) -> NavState:
+        """The state moved by an estimated error (n,), true minus computed."""
+        scales = np.zeros(6)
+        scales[: self.size - 15] = correction[15:]
+        turn = rotation.quat_from_rotvec(correction[ATTITUDE])
+        q_nb = rotation.quat_multiply(turn, state.q_nb)
+        return NavState(
+            earth.move_lla(state.lla, correction[POSITION]),
+            state.vel_n + correction[VELOCITY],
+            q_nb / np.linalg.norm(q_nb),
+            state.gyro_bias + correction[GYRO_BIAS],
+            state.accel_bias + correction[ACCEL_BIAS],
+            state.gyro_scale + scales[:3],
+            state.accel_scale + scales[3:],
+        )
+
+    def propagate(
+        self, state: NavState, cov: Floats, steps: Steps, first: int, ends: np.ndarray, interval: float, keep: bool = False
+    ) -> Propagated:
+        """From state and cov (n, n) before step `first` to the nodes behind ends (k,) steps, counted from the first of all.
+
+        interval [s]: longest step of the covariance. keep: return transitions and noises as well.
+        """
+        k, n = len(ends), self.size
+        kept = k if keep else 0
+        out = Propagated(np.empty((k, 22)), np.empty((k, n, n)), np.empty((kept, n, n)), np.empty((kept, n, n)))
+        part = slice(first, int(ends[-1]))
+        _kernels.propagate(
+            state.pack(),
+            cov,
+            steps.dt[part],
+            steps.dtheta[part],
+            steps.dvel[part],
+            steps.bridged[part],
+            ends - first,
+            self.density(),
+            self.correlation_time(),
+            interval,
+            out.states,
+            out.covariances,
+            out.transitions,
+            out.noises,
+        )
+        return out

@@ -1,0 +1,66 @@
+"""The measurement update: one innovation, one conditioning, for every filter."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from navreplay.timeline import Floats
+
+__all__ = ["Gaussian", "Innovation", "chi_square", "condition", "kalman_gain", "symmetric"]
+
+
+class Gaussian(NamedTuple):
+    """mean (n,) and covariance cov (n, n) of the error state."""
+
+    mean: Floats
+    cov: Floats
+
+
+class Innovation(NamedTuple):
+    """A measurement against its prediction.
+
+    residual (m,): measured minus predicted. cross (n, m): covariance of state and prediction. spread (m, m): covariance of
+    the prediction without noise. noise (m, m): nominal R. labels (m,): one per component, e.g. ``position north``.
+    """
+
+    residual: Floats
+    cross: Floats
+    spread: Floats
+    noise: Floats
+    labels: tuple[str, ...]
+
+    def select(self, rows: np.ndarray) -> "Innovation":
+        """The components with index in rows (k,)."""
+        square = np.ix_(rows, rows)
+        labels = tuple(self.labels[i] for i in rows)
+        return Innovation(self.residual[rows], self.cross[:, rows], self.spread[square], self.noise[square], labels)
+
+
+def symmetric(matrix: Floats) -> Floats:
+    """The symmetric part of matrix (n, n)."""
+    return np.asarray((matrix + matrix.T) / 2)
+
+
+def kalman_gain(innovation: Innovation, noise: Floats) -> Floats:
+    """Gain K (n, m) = cross S^-1 with S = spread + noise (m, m)."""
+    factor = cho_factor(innovation.spread + noise, lower=True, check_finite=False)
+    return np.asarray(cho_solve(factor, innovation.cross.T, check_finite=False).T)
+
+
+def condition(prior: Gaussian, innovation: Innovation, noise: Floats, gain: Floats | None = None) -> Gaussian:
+    """Posterior with R = noise (m, m), for any gain (n, m); without one the optimal gain.
+
+    The Joseph form written for joint moments: [I, -K] [[P, C], [C', S]] [I, -K]' = P - K C' - C K' + K S K'; with C = P H' and
+    S = H P H' + R it is (I - K H) P (I - K H)' + K R K'.
+    """
+    k = kalman_gain(innovation, noise) if gain is None else gain
+    spread = innovation.spread + noise
+    shared = k @ innovation.cross.T
+    cov = prior.cov - shared - shared.T + k @ spread @ k.T
+    return Gaussian(prior.mean + k @ innovation.residual, symmetric(cov))
+
+
+def chi_square(residual: Floats, cov: Floats) -> float:
+    """residual' cov^-1 residual, of residual (m,) and cov (m, m)."""
+    return float(residual @ cho_solve(cho_factor(cov, lower=True, check_finite=False), residual, check_finite=False))

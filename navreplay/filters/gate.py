@@ -1,0 +1,74 @@
+"""Innovation gate: each kind of an epoch's measurement is tested by itself, and a filter shut out too long is reopened."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import chi2
+
+from navreplay.filters.core import Innovation, chi_square
+from navreplay.filters.record import Judged
+from navreplay.options import GateOptions
+from navreplay.timeline import Floats
+
+__all__ = ["Gate", "Verdict"]
+
+
+class Verdict(NamedTuple):
+    """passed (k,): indices of the components to use. nis: normalised square per kind. reasons: per kind, empty where used.
+    inflation: factor on the prior covariance, above 1 where the gate had to be reopened after `run` rejected epochs."""
+
+    passed: np.ndarray
+    nis: dict[str, float]
+    reasons: dict[str, str]
+    inflation: float
+    run: int
+
+    def parts(self, kinds: tuple[str, ...], innovation: Innovation, noise: Floats) -> Iterator[tuple[str, Judged]]:
+        """Per kind, its components with the verdict on them."""
+        for kind, rows in _rows_of(kinds).items():
+            yield kind, Judged(innovation.select(rows), noise[np.ix_(rows, rows)], self.nis[kind], self.reasons[kind])
+
+
+def _rows_of(kinds: tuple[str, ...]) -> dict[str, np.ndarray]:
+    return {kind: np.array([i for i, k in enumerate(kinds) if k == kind]) for kind in dict.fromkeys(kinds)}
+
+
+class Gate:
+    """Chi-square gate with a count of position epochs rejected in a row."""
+
+    def __init__(self, options: GateOptions) -> None:
+        self._options = options
+        self._run = 0
+
+    def judge(self, kinds: tuple[str, ...], innovation: Innovation, noise: Floats) -> Verdict:
+        """The verdict on an innovation with R = noise (m, m) whose components are of the given kinds (m,)."""
+        rows = _rows_of(kinds)
+        nis = {kind: self._square(innovation, noise, at) for kind, at in rows.items()}
+        limit = {kind: self._limit(len(at)) for kind, at in rows.items()}
+        failed = [kind for kind in rows if nis[kind] > limit[kind]]
+        inflation = 1.0
+        run = self._run
+        if failed and len(failed) == len(rows):
+            self._run += 1
+            run = self._run
+            if 0 < self._options.reset_after <= run:
+                # more than enough: the factor acts on the prior's part of S only
+                inflation = 2 * max(nis[kind] / len(rows[kind]) for kind in failed)
+                failed = []
+                self._run = 0
+        elif "position" in rows and "position" not in failed:
+            self._run = 0
+        reasons = {
+            kind: f"innovation {nis[kind]:.1f} beyond the gate of {limit[kind]:.1f}" if kind in failed else "" for kind in rows
+        }
+        passed = np.array([i for i, kind in enumerate(kinds) if kind not in failed], dtype=np.intp)
+        return Verdict(passed, nis, reasons, inflation, run)
+
+    def _limit(self, size: int) -> float:
+        return float(chi2.ppf(self._options.probability, size)) if self._options.probability < 1 else float("inf")
+
+    @staticmethod
+    def _square(innovation: Innovation, noise: Floats, rows: np.ndarray) -> float:
+        square = np.ix_(rows, rows)
+        return chi_square(innovation.residual[rows], innovation.spread[square] + noise[square])

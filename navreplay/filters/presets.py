@@ -1,0 +1,80 @@
+"""Named methods: each a composition of a moment rule and a noise adapter."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from difflib import get_close_matches
+from typing import Any
+
+from navreplay.adapt.adapter import NoiseAdapter
+from navreplay.adapt.fixed import Fixed
+from navreplay.adapt.huber import Huber
+from navreplay.adapt.iae import Iae
+from navreplay.adapt.sage_husa import SageHusa
+from navreplay.filters.moments import Linearised
+from navreplay.timeline import LogError
+
+__all__ = ["PRESETS", "Method", "Preset", "build_method"]
+
+
+@dataclass(frozen=True, slots=True)
+class Method:
+    """What the epoch loop runs. name: of the preset."""
+
+    name: str
+    rule: Linearised
+    adapter: NoiseAdapter[Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Preset:
+    """name, one line of description, and the adapter's type, whose fields are the parameters."""
+
+    name: str
+    description: str
+    adapter: Callable[..., NoiseAdapter[Any]]
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """Names and defaults of the parameters."""
+        return {field.name: field.default for field in fields(self.adapter)}  # type: ignore[arg-type]
+
+
+PRESETS: dict[str, Preset] = {
+    preset.name: preset
+    for preset in (
+        Preset("fixed", "extended Kalman filter with the noise it is told", Fixed),
+        Preset("iae", "R from the innovations of a window (Mohamed and Schwarz 1999)", Iae),
+        Preset("sage-husa", "R as a fading mean over the innovations (Sage and Husa 1969)", SageHusa),
+        Preset("huber", "outlying measurements weighted down (Huber 1964, Karlgaard and Schaub 2007)", Huber),
+    )
+}
+
+
+def build_method(name: str, parameters: Mapping[str, object] | None = None) -> Method:
+    """The method of a preset with its parameters replaced.
+
+    Raises LogError for an unknown name or parameter, or a value of the wrong type, with what would be valid.
+    """
+    if name not in PRESETS:
+        raise LogError(f"filter: there is no '{name}'; {_suggest(name, list(PRESETS))}")
+    preset = PRESETS[name]
+    defaults = preset.parameters
+    for key, value in (parameters or {}).items():
+        if key not in defaults:
+            raise LogError(f"filter '{name}': there is no parameter '{key}'; {_suggest(key, list(defaults))}")
+        _check_number(name, key, value, defaults[key])
+    return Method(name, Linearised(), preset.adapter(**(parameters or {})))
+
+
+def _suggest(wrong: str, known: list[str]) -> str:
+    near = get_close_matches(wrong, known, n=1)
+    return f"did you mean '{near[0]}'?" if near else f"known are: {', '.join(known) or 'none'}"
+
+
+def _check_number(name: str, key: str, value: object, default: object) -> None:
+    whole = isinstance(default, int)
+    if isinstance(value, bool) or not isinstance(value, int if whole else (int, float)):
+        wanted = "a whole number" if whole else "a number"
+        raise LogError(f"filter '{name}': parameter '{key}' must be {wanted}, got {value!r}")
+    if value <= 0:
+        raise LogError(f"filter '{name}': parameter '{key}' must be positive, got {value!r}")

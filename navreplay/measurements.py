@@ -1,0 +1,117 @@
+"""Measurements of the NED filters: what was measured, minus what the state predicts, with Jacobian and nominal noise."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from navreplay import earth
+from navreplay.error_models.ned import ATTITUDE, GYRO_BIAS, POSITION, VELOCITY
+from navreplay.options import FilterOptions
+from navreplay.rotation import matrix_from_quat
+from navreplay.strapdown import NavState
+from navreplay.timeline import FixStatus, Floats, GnssFixSeries
+
+__all__ = ["FixNoise", "Measurement", "angular_rate", "fix_noise", "join", "position_measurement", "velocity_measurement"]
+
+_AXES = ("north", "east", "down")
+
+
+class Measurement(NamedTuple):
+    """residual (m,): measured minus predicted. jacobian (m, n) against the error state. noise (m, m): told R. kinds and labels
+    (m,): what each component is a part of (``position``), and its own name (``north``)."""
+
+    residual: Floats
+    jacobian: Floats
+    noise: Floats
+    kinds: tuple[str, ...]
+    labels: tuple[str, ...]
+
+
+class FixNoise(NamedTuple):
+    """Told noise of every row of a fix series: position (k, 3, 3) [m^2] and velocity (k, 3, 3) [m^2/s^2], NED."""
+
+    position: Floats
+    velocity: Floats
+
+
+def fix_noise(fixes: GnssFixSeries, options: FilterOptions) -> FixNoise:
+    """R of each fix: its covariance where known, the default of its status elsewhere; floors, then the noise scale, applied."""
+    horizontal, vertical = np.array([options.default_position_std[s.name] for s in FixStatus]).T
+    default = np.stack([horizontal, horizontal, vertical], axis=1)[fixes.status] ** 2
+    position = _fill_unknown(fixes.cov_pos, default)
+    across, along_down = options.default_velocity_std
+    velocity = _fill_unknown(fixes.cov_vel, np.tile(np.square([across, across, along_down]), (len(fixes), 1)))
+    scale = options.noise_scale**2
+    return FixNoise(
+        _raise_diagonal(position, options.position_std_floor**2) * scale,
+        _raise_diagonal(velocity, options.velocity_std_floor**2) * scale,
+    )
+
+
+def _fill_unknown(cov: Floats, default: Floats) -> Floats:
+    unknown = np.isnan(cov.sum(axis=(1, 2)))
+    return np.where(unknown[:, None, None], default[:, :, None] * np.eye(3), cov)
+
+
+def _raise_diagonal(cov: Floats, least: float) -> Floats:
+    missing = np.maximum(least - np.diagonal(cov, axis1=1, axis2=2), 0)
+    return np.asarray(cov + missing[:, :, None] * np.eye(3))
+
+
+def angular_rate(state: NavState, dtheta: Floats, dt: float) -> Floats:
+    """Rate of the body against the Earth (3,) [rad/s], body axes, from one step's rotation (3,) and length [s]."""
+    inertial = (dtheta / dt - state.gyro_bias) / (1 + state.gyro_scale)
+    return np.asarray(inertial - matrix_from_quat(state.q_nb).T @ earth.earth_rate_n(state.lla[0]))
+
+
+def position_measurement(state: NavState, lever_b: Floats, lla: Floats, noise: Floats, size: int) -> Measurement:
+    """Antenna position lla (3,) against the IMU's, lever arm lever_b (3,) [m], noise (3, 3); error state of given size.
+
+    Residual in NED metres. Groves (2013), 14.3.
+    """
+    lever_n = matrix_from_quat(state.q_nb) @ lever_b
+    meridian, normal = earth.radii(state.lla[0])
+    height = state.lla[2]
+    metres = np.array([meridian + height, (normal + height) * np.cos(state.lla[0]), -1.0])
+    difference = lla - state.lla
+    difference[1] = (difference[1] + np.pi) % (2 * np.pi) - np.pi
+    jacobian = np.zeros((3, size))
+    jacobian[:, POSITION] = np.eye(3)
+    jacobian[:, ATTITUDE] = -_cross(lever_n)
+    return Measurement(difference * metres - lever_n, jacobian, noise, ("position",) * 3, _AXES)
+
+
+def velocity_measurement(
+    state: NavState, lever_b: Floats, rate_b: Floats, vel_n: Floats, noise: Floats, size: int
+) -> Measurement:
+    """Antenna velocity vel_n (3,) NED against the IMU's plus w x l, with rate_b (3,) of the body against the Earth [rad/s]."""
+    c_nb = matrix_from_quat(state.q_nb)
+    swing_n = c_nb @ (_cross(rate_b) @ lever_b)
+    jacobian = np.zeros((3, size))
+    jacobian[:, VELOCITY] = np.eye(3)
+    jacobian[:, ATTITUDE] = -_cross(swing_n)
+    jacobian[:, GYRO_BIAS] = c_nb @ _cross(lever_b)
+    return Measurement(vel_n - state.vel_n - swing_n, jacobian, noise, ("velocity",) * 3, _AXES)
+
+
+def join(parts: list[Measurement]) -> Measurement:
+    """One measurement of all components of several, their noises independent."""
+    if len(parts) == 1:
+        return parts[0]
+    sizes = [len(part.residual) for part in parts]
+    noise = np.zeros((sum(sizes), sum(sizes)))
+    start = 0
+    for part, size in zip(parts, sizes, strict=True):
+        noise[start : start + size, start : start + size] = part.noise
+        start += size
+    return Measurement(
+        np.concatenate([part.residual for part in parts]),
+        np.concatenate([part.jacobian for part in parts]),
+        noise,
+        tuple(kind for part in parts for kind in part.kinds),
+        tuple(label for part in parts for label in part.labels),
+    )
+
+
+def _cross(v: Floats) -> Floats:
+    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
