@@ -3,7 +3,6 @@
 Windows are (start, end) in seconds from the start of the log, the end excluded; scales act on standard deviations.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from math import sqrt
 
@@ -17,11 +16,9 @@ from navreplay.timeline import FixStatus, Floats, GnssFixSeries, Times
 from synthetic_logs.imu import turn_rate_b
 from synthetic_logs.imu_errors import draw_gauss_markov
 from synthetic_logs.motion import Kinematics
+from synthetic_logs.seeding import generator_for
 
-__all__ = ["PURPOSES", "AntennaPath", "FixErrors", "GnssErrors", "antenna_path", "measure_fixes"]
-
-PURPOSES = ("white position", "white velocity", "correlated position", "mixture", "outlier epochs", "outlier directions")
-"""What random numbers are drawn for here, each from a generator of its own."""
+__all__ = ["AntennaPath", "FixErrors", "GnssErrors", "antenna_path", "measure_fixes"]
 
 Triple = tuple[float, float, float]
 ScaledWindow = tuple[float, float, float]
@@ -112,36 +109,34 @@ def _draw_correlated(n: int, interval: float, errors: GnssErrors, rng: Generator
     return np.array(errors.correlated_std) * draw_gauss_markov(rng, steady, sqrt(2 / tau), tau, interval, n)
 
 
-def _draw_errors(
-    antenna: AntennaPath, t_s: Floats, interval: float, errors: GnssErrors, rngs: Mapping[str, Generator]
-) -> FixErrors:
+def _draw_errors(antenna: AntennaPath, t_s: Floats, interval: float, errors: GnssErrors, seed: int) -> FixErrors:
     n = len(t_s)
-    correlated = _draw_correlated(n, interval, errors, rngs["correlated position"])
-    wide = rngs["mixture"].random(n) < errors.mixture_probability
-    outlier = rngs["outlier epochs"].random(n) < errors.outlier_probability
-    direction = rngs["outlier directions"].standard_normal((n, 3))
+    correlated = _draw_correlated(n, interval, errors, generator_for(seed, "correlated position"))
+    wide = generator_for(seed, "mixture").random(n) < errors.mixture_probability
+    outlier = generator_for(seed, "outlier epochs").random(n) < errors.outlier_probability
+    direction = generator_for(seed, "outlier directions").standard_normal((n, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     window_scale = _scale_in(errors.noise_windows, t_s)[:, None]
     drawn_scale = window_scale * np.where(wide, errors.mixture_scale, 1.0)[:, None]
     share = errors.mixture_probability
     moment_scale = window_scale * np.sqrt(1 - share + share * errors.mixture_scale**2)
     velocity_std = np.array(errors.velocity_std or (0.0, 0.0, 0.0))
-    position = drawn_scale * errors.position_std * rngs["white position"].standard_normal((n, 3)) + correlated
+    position = drawn_scale * errors.position_std * generator_for(seed, "white position").standard_normal((n, 3)) + correlated
     position += np.where(outlier, errors.outlier_size, 0.0)[:, None] * direction
-    velocity = drawn_scale * velocity_std * rngs["white velocity"].standard_normal((n, 3))
+    velocity = drawn_scale * velocity_std * generator_for(seed, "white velocity").standard_normal((n, 3))
     cov_pos = _diagonal(moment_scale * errors.position_std) + _diagonal(np.tile(errors.correlated_std, (n, 1)))
     return FixErrors(antenna, position, velocity, correlated, wide, outlier, cov_pos, _diagonal(moment_scale * velocity_std))
 
 
 def measure_fixes(
-    t_ns: Times, t_s: Floats, interval: float, antenna: AntennaPath, errors: GnssErrors, rngs: Mapping[str, Generator]
+    t_ns: Times, t_s: Floats, interval: float, antenna: AntennaPath, errors: GnssErrors, seed: int
 ) -> tuple[GnssFixSeries, FixErrors]:
     """The fixes of a log and their errors, without the epochs in outages.
 
-    t_ns: (n,) epochs, t_s: the same from the start of the log [s], interval [s] apart. rngs: one generator per purpose in
-    `PURPOSES`; outages and changed figures leave all other draws as they are.
+    t_ns: (n,) epochs, t_s: the same from the start of the log [s], interval [s] apart. Outages and changed figures leave
+    all other draws of a seed as they are.
     """
-    drawn = _draw_errors(antenna, t_s, interval, errors, rngs)
+    drawn = _draw_errors(antenna, t_s, interval, errors, seed)
     n = len(t_s)
     told_scale = _scale_in(errors.told_windows, t_s)[:, None]
     told_position = np.array(errors.told_position_std or np.hypot(errors.position_std, errors.correlated_std))

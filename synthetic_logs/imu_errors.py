@@ -4,7 +4,6 @@ measured = (I + diag(scale) + misalignment) true + bias + noise, rounded to the 
 `navreplay.options.ImuNoise`, so that a filter can be told exactly what was drawn.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from math import exp, inf, sqrt
 
@@ -13,15 +12,9 @@ from numpy.random import Generator
 
 from navreplay.options import ImuNoise
 from navreplay.timeline import Floats, ImuSeries
+from synthetic_logs.seeding import generator_for
 
-__all__ = ["PURPOSES", "ImuErrors", "SensorErrors", "disturb_imu", "draw_gauss_markov"]
-
-PURPOSES = tuple(
-    f"{sensor} {error}"
-    for sensor in ("gyro", "accel")
-    for error in ("turn-on bias", "bias walk", "scale", "misalignment", "noise")
-)
-"""What random numbers are drawn for here, each from a generator of its own."""
+__all__ = ["ImuErrors", "SensorErrors", "disturb_imu", "draw_gauss_markov"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,25 +71,22 @@ def draw_gauss_markov(rng: Generator, start: Floats, walk: float, tau: float, dt
     return np.asarray(lfilter([1.0], [1.0, -decay], drive, axis=0))
 
 
-def _disturb(true: Floats, dt: float, model: _Triad, rngs: Mapping[str, Generator]) -> tuple[Floats, SensorErrors]:
-    turn_on = model.bias_std * rngs[f"{model.name} turn-on bias"].standard_normal(3)
-    bias = draw_gauss_markov(rngs[f"{model.name} bias walk"], turn_on, model.walk, model.tau, dt, len(true))
-    matrix = model.misalignment_std * rngs[f"{model.name} misalignment"].standard_normal((3, 3))
-    np.fill_diagonal(matrix, model.scale_std * rngs[f"{model.name} scale"].standard_normal(3))
-    noise = model.density / sqrt(dt) * rngs[f"{model.name} noise"].standard_normal(true.shape)
+def _disturb(true: Floats, dt: float, model: _Triad, seed: int) -> tuple[Floats, SensorErrors]:
+    turn_on = model.bias_std * generator_for(seed, f"{model.name} turn-on bias").standard_normal(3)
+    bias = draw_gauss_markov(generator_for(seed, f"{model.name} bias walk"), turn_on, model.walk, model.tau, dt, len(true))
+    matrix = model.misalignment_std * generator_for(seed, f"{model.name} misalignment").standard_normal((3, 3))
+    np.fill_diagonal(matrix, model.scale_std * generator_for(seed, f"{model.name} scale").standard_normal(3))
+    noise = model.density / sqrt(dt) * generator_for(seed, f"{model.name} noise").standard_normal(true.shape)
     measured = true + true @ matrix.T + bias + noise
     if model.quantum > 0:
         measured = model.quantum * np.rint(measured / model.quantum)
     return measured, SensorErrors(bias, matrix)
 
 
-def disturb_imu(
-    true: ImuSeries, dt: float, errors: ImuErrors, rngs: Mapping[str, Generator]
-) -> tuple[ImuSeries, SensorErrors, SensorErrors]:
+def disturb_imu(true: ImuSeries, dt: float, errors: ImuErrors, seed: int) -> tuple[ImuSeries, SensorErrors, SensorErrors]:
     """The series as a real IMU would give it, and the errors of its gyros and accelerometers.
 
-    dt: sampling interval [s]. rngs: one generator per purpose in `PURPOSES`, so that a changed figure leaves all other draws
-    as they are.
+    dt: sampling interval [s]. Every kind of error draws from its own generator (`synthetic_logs.seeding`).
     """
     noise = errors.noise
     gyro_model = _Triad(
@@ -119,6 +109,6 @@ def disturb_imu(
         errors.accel_misalignment_std,
         errors.accel_quantum,
     )
-    gyro, gyro_errors = _disturb(true.gyro, dt, gyro_model, rngs)
-    accel, accel_errors = _disturb(true.accel, dt, accel_model, rngs)
+    gyro, gyro_errors = _disturb(true.gyro, dt, gyro_model, seed)
+    accel, accel_errors = _disturb(true.accel, dt, accel_model, seed)
     return ImuSeries(true.t_ns, gyro, accel, true.increments), gyro_errors, accel_errors

@@ -176,7 +176,7 @@ class Path:
 def trace(motion: Motion, duration: float) -> Path:
     """Integrates a motion over duration [s]."""
     panels = int(np.ceil(duration / _PANEL_S)) + 1
-    grid: Floats = np.arange(panels + 1) * _PANEL_S
+    grid = np.arange(panels + 1, dtype=np.float64) * _PANEL_S
     profile, course = _profiles(motion, float(grid[-1]))
     lla = _integrate_position(np.array(motion.lla), profile, course, grid)
     return Path(duration, motion.coordinated, profile, course, lla)

@@ -4,20 +4,15 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.random import Generator, SeedSequence, default_rng
 
 from navreplay.rotation import quat_from_euler
-from navreplay.timeline import Floats, GnssFixSeries, ImuSeries, Timeline, Times, Trajectory
-from synthetic_logs import gnss, imu_errors
+from navreplay.timeline import Floats, GnssFixSeries, ImuSeries, LogError, Timeline, Times, Trajectory
 from synthetic_logs.gnss import AntennaPath, FixErrors, GnssErrors, antenna_path, measure_fixes
 from synthetic_logs.imu import sense, sense_means
 from synthetic_logs.imu_errors import ImuErrors, SensorErrors, disturb_imu
 from synthetic_logs.motion import Motion, Path, trace
 
 __all__ = ["Journey", "Scenario", "SyntheticLog", "ideal_imu", "simulate", "truth_at", "with_duration"]
-
-PURPOSES = imu_errors.PURPOSES + gnss.PURPOSES
-"""New purposes go to the end: the place in this tuple decides which random numbers a purpose gets from a seed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,20 +75,17 @@ def simulate(scenario: Scenario, seed: int) -> SyntheticLog:
     """Draws one log; the same scenario and seed give the same log bit for bit.
 
     Every kind of error has a random generator of its own, derived from the seed, so that logs of one seed with and without
-    an error share all their other errors. Raises LogError for a journey too short to hold a sample of each sensor.
+    an error share all their other errors. Raises LogError for a negative seed and for a journey too short to hold a sample of
+    each sensor.
     """
+    if seed < 0:
+        raise LogError(f"synthetic log: a seed is a whole number from 0 on, got {seed}")
     journey = scenario.journey
-    rngs = _generators(seed)
-    imu, gyro_errors, accel_errors = disturb_imu(ideal_imu(journey), 1 / journey.imu_rate, scenario.imu, rngs)
+    imu, gyro_errors, accel_errors = disturb_imu(ideal_imu(journey), 1 / journey.imu_rate, scenario.imu, seed)
     t_ns, antenna = _ideal_fixes(journey)
     t_s = (t_ns - journey.start_ns) / 1e9
-    fixes, fix_errors = measure_fixes(t_ns, t_s, 1 / journey.gnss_rate, antenna, scenario.gnss, rngs)
+    fixes, fix_errors = measure_fixes(t_ns, t_s, 1 / journey.gnss_rate, antenna, scenario.gnss, seed)
     return SyntheticLog(scenario, seed, imu, fixes, _truth(journey), gyro_errors, accel_errors, fix_errors)
-
-
-def _generators(seed: int) -> dict[str, Generator]:
-    children = SeedSequence(seed).spawn(len(PURPOSES))
-    return {purpose: default_rng(child) for purpose, child in zip(PURPOSES, children, strict=True)}
 
 
 def _stamps(journey: Journey, rate: float, offset: float) -> Times:
