@@ -189,7 +189,8 @@ class CsvMapping(_Settings):
 
 
 class InputSettings(_Settings):
-    """Everything about the input. leap_seconds: a table in the IERS format replacing the built-in one. gps_week: full week
+    """Everything about the input. Where a channel is not named, the only one of a fitting type is taken; ``none`` takes none.
+    leap_seconds: a table in the IERS format replacing the built-in one. gps_week: full week
     where a file holds only seconds of week. utc_date: date of the first sentence where an NMEA file holds none."""
 
     leap_seconds: Path | None = None

@@ -1,0 +1,148 @@
+"""Formats that can be read, and opening a log by what it holds."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from importers.clock import leap_seconds
+from importers.csv_layouts import find_layout, read_layout
+from importers.csv_mapping import find_mapping, read_mapped
+from importers.kf_gins import find_kf_gins, read_gnss, read_imu
+from importers.log import Log
+from importers.nmea import is_nmea, read_nmea
+from importers.rtklib_pos import is_pos, read_pos
+from importers.settings import InputSettings
+from importers.text_log import TextLog
+from importers.tum import is_tum, read_tum
+from navreplay.timeline import LogError
+
+__all__ = ["FORMATS", "Format", "open_log"]
+
+_HEAD_BYTES = 20_000
+
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """A readable format: name, a line about it, the usual extensions, and its opener, which returns None when the head (the
+    first 20 kB) is not of this format."""
+
+    name: str
+    description: str
+    extensions: tuple[str, ...]
+    open: Callable[[str, bytes, InputSettings], Log | None]
+
+
+def open_log(path: str | Path, settings: InputSettings | None = None) -> Log:
+    """Opens a log (a file, or the folder of a ROS 2 bag) by its content. Raises LogError when it is missing, empty or
+    unknown."""
+    settings = settings or InputSettings()
+    name = str(path)
+    head = b"" if Path(name).is_dir() else _read_head(name)
+    for known in FORMATS:
+        log = known.open(name, head, settings)
+        if log is not None:
+            return log
+    binary = next((known for known in FORMATS[:3] if Path(name).suffix in known.extensions), None)
+    if binary is not None:
+        raise LogError(
+            f"{name}: does not begin like a {binary.description.split(',')[0].split(' with')[0]}; damaged, or misnamed?"
+        )
+    raise LogError(
+        f"{name}: unknown format; by its content it is none of {', '.join(known.name for known in FORMATS)}. "
+        "A table of numbers needs an [[input.csv]] entry that names its columns"
+    )
+
+
+def _read_head(path: str) -> bytes:
+    try:
+        with Path(path).open("rb") as file:
+            head = file.read(_HEAD_BYTES)
+    except OSError as error:
+        raise LogError(f"{path}: cannot be read: {error.strerror}") from error
+    if not head:
+        raise LogError(f"{path}: the file is empty; was the recording ever started, or the copy cut short?")
+    return head
+
+
+def _text(head: bytes) -> str:
+    encoding = "utf-16" if head[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"
+    return head.decode(encoding, errors="replace")
+
+
+def _open_mcap(path: str, head: bytes, settings: InputSettings) -> Log | None:
+    if not head.startswith(b"\x89MCAP"):
+        return None
+    from importers.mcap_log import McapLog
+
+    return McapLog(path)
+
+
+def _open_ros1(path: str, head: bytes, settings: InputSettings) -> Log | None:
+    if not head.startswith(b"#ROSBAG"):
+        return None
+    from importers.ros1_bag import Ros1Bag
+
+    return Ros1Bag(path)
+
+
+def _open_ros2(path: str, head: bytes, settings: InputSettings) -> Log | None:
+    folder = Path(path).is_dir()
+    if folder and not any(Path(path).glob("metadata.yaml")) and not any(Path(path).glob("*.db3")):
+        raise LogError(f"{path}: the folder holds no ROS 2 bag (no metadata.yaml, no .db3); name the log file itself")
+    if not folder and not head.startswith(b"SQLite format 3\x00"):
+        return None
+    from importers.ros2_bag import Ros2Bag
+
+    return Ros2Bag(path)
+
+
+def _open_mapped(path: str, head: bytes, settings: InputSettings) -> Log | None:
+    mapping = find_mapping(path, settings.csv)
+    if mapping is None:
+        return None
+    leap = leap_seconds(settings.leap_seconds)
+    return TextLog(path, "csv", f"csv/{mapping.role}", lambda: read_mapped(path, mapping, settings.gps_week, leap))
+
+
+def _open_own(path: str, head: bytes, settings: InputSettings) -> Log | None:
+    lines = [line for line in _text(head).splitlines() if line.strip() and not line.startswith("#")]
+    layout = find_layout(lines[0]) if lines else None
+    return None if layout is None else TextLog(path, "csv", layout, lambda: read_layout(path, layout))
+
+
+def _open_pos(path: str, head: bytes, settings: InputSettings) -> Log | None:
+    if not is_pos(_text(head)):
+        return None
+    return TextLog(path, "pos", "rtklib/pos", lambda: read_pos(path, leap_seconds(settings.leap_seconds)))
+
+
+def _open_nmea(path: str, head: bytes, settings: InputSettings) -> Log | None:
+    if not is_nmea(_text(head)):
+        return None
+    return TextLog(path, "nmea", "nmea", lambda: read_nmea(path, settings.utc_date, leap_seconds(settings.leap_seconds)))
+
+
+def _open_kf_gins(path: str, head: bytes, settings: InputSettings) -> Log | None:
+    layout = find_kf_gins(_text(head))
+    if layout is None:
+        return None
+    read = read_imu if layout == "kf_gins/imu" else read_gnss
+    return TextLog(path, "kf-gins", layout, lambda: read(path, settings.gps_week))
+
+
+def _open_tum(path: str, head: bytes, settings: InputSettings) -> Log | None:
+    return TextLog(path, "tum", "tum", lambda: read_tum(path)) if is_tum(_text(head)) else None
+
+
+FORMATS: tuple[Format, ...] = (
+    Format("mcap", "MCAP with ROS 2, ROS 1, Foxglove JSON or protobuf messages", (".mcap",), _open_mcap),
+    Format("ros1", "ROS 1 bag", (".bag",), _open_ros1),
+    Format("ros2", "ROS 2 bag: the folder, or its .db3 file", (".db3",), _open_ros2),
+    Format("csv", "any table of numbers, or matrix of a MATLAB file, by [[input.csv]]", (".csv", ".txt", ".mat"), _open_mapped),
+    Format("navreplay", "this program's own CSV: imu, fix, trajectory, solution", (".csv",), _open_own),
+    Format("pos", "RTKLIB position file", (".pos",), _open_pos),
+    Format("nmea", "NMEA 0183 (GGA and RMC)", (".nmea", ".gga"), _open_nmea),
+    Format("kf-gins", "KF-GINS text: IMU increments, GNSS positions", (".txt",), _open_kf_gins),
+    Format("tum", "TUM trajectory, as a reference", (".tum", ".txt"), _open_tum),
+)
+"""In the order in which they are tried."""

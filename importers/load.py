@@ -1,0 +1,148 @@
+"""Loading logs into one timeline."""
+
+from collections.abc import Callable, Sequence
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+
+from importers.clock import leap_seconds
+from importers.fix_conversion import convert_fixes
+from importers.formats import open_log
+from importers.imu_conversion import convert_imu
+from importers.log import Log, Table
+from importers.reference_conversion import convert_attitude, convert_reference, reference_from_fixes
+from importers.selection import Choice, choose_channels
+from importers.settings import InputSettings
+from importers.sources import Clock, Source, join_sources
+from navreplay.timeline import ChannelUse, LogError, Provenance, SourceFile, Timeline
+
+__all__ = ["build_timeline", "hash_file", "load_timeline", "open_logs"]
+
+Progress = Callable[[float], None]
+_BLOCK = 1 << 20
+
+
+def load_timeline(
+    paths: Sequence[str | Path],
+    settings: InputSettings | None = None,
+    reference: str | Path | None = None,
+    progress: Progress | None = None,
+) -> Timeline:
+    """Reads logs, and a reference beside them, into one timeline; progress is called with the fraction done.
+
+    A series no channel serves is None: `importers.preflight` tells what that means. Raises LogError where a file cannot be
+    read, a channel is missing or ambiguous, or a chosen channel holds nothing usable.
+    """
+    settings = settings or InputSettings()
+    logs = open_logs(paths, settings)
+    reference = settings.reference.file if reference is None else reference
+    reference_log = None if reference is None else open_log(reference, settings)
+    choices = choose_channels(logs, settings, reference_log)
+    everything = [*logs, *([] if reference_log is None else [reference_log])]
+    if not choices:
+        types = (
+            ", ".join(f"{channel.name} ({channel.type})" for log in logs for channel in log.channels()) or "no channel at all"
+        )
+        raise LogError(f"{_names(logs)}: no channel can serve navigation; there is {types}")
+    return build_timeline(everything, choices, _read_tables(everything, choices, progress), settings)
+
+
+def open_logs(paths: Sequence[str | Path], settings: InputSettings) -> list[Log]:
+    """The logs, each file once. Raises LogError."""
+    if not paths:
+        raise LogError("no log was named")
+    return [open_log(path, settings) for path in dict.fromkeys(str(path) for path in paths)]
+
+
+def build_timeline(
+    logs: Sequence[Log], choices: Sequence[Choice], tables: dict[tuple[int, str], Table], settings: InputSettings
+) -> Timeline:
+    """The timeline of channels already read: tables by the log's identity and the channel's name. Raises LogError."""
+    sources: dict[str, list[Source]] = {}
+    for choice in choices:
+        table = tables[id(choice.log), choice.channel.name]
+        sources.setdefault(choice.role, []).append(Source(choice.log.path, choice.channel, table, choice.role))
+    clock = Clock(leap_seconds(settings.leap_seconds), tuple(source.table for source in sources.get("time", [])))
+    uses: list[ChannelUse] = [_time_use(source) for source in sources.get("time", [])]
+    notes: list[str] = [note for log in logs for note in log.notes]
+    imu = fixes = attitude = trajectory = None
+    if "imu" in sources:
+        imu, told, assumed = convert_imu(join_sources(sources["imu"], settings.imu, clock), settings.imu)
+        uses, notes = [*uses, *told], [*notes, *assumed]
+    if "fix" in sources or "velocity" in sources:
+        position, velocity = (join_sources(sources[role], settings.fix, clock) if role in sources else None for role in _GNSS)
+        fixes, told, assumed = convert_fixes(position, velocity, settings.fix)
+        uses, notes = [*uses, *told], [*notes, *assumed]
+    if "attitude" in sources:
+        attitude, told, assumed = convert_attitude(
+            join_sources(sources["attitude"], settings.attitude, clock), settings.attitude
+        )
+        uses, notes = [*uses, *told], [*notes, *assumed]
+    if "reference" in sources:
+        joined = join_sources(sources["reference"], settings.reference, clock)
+        trajectory, told, assumed = convert_reference(joined, settings.reference)
+        uses, notes = [*uses, *told], [*notes, *assumed]
+    elif settings.reference.from_fixes and fixes is not None:
+        trajectory = reference_from_fixes(fixes, settings.reference)
+        notes.append("the fixes themselves, before any is withheld, serve as the reference: not an independent one")
+    files = tuple(SourceFile(log.path, log.format, *hash_file(log.path)) for log in logs)
+    provenance = Provenance(files, _complete(logs, uses), tuple(dict.fromkeys(notes)))
+    levers = (np.array(settings.fix.lever_arm_m), _reference_lever(settings))
+    return Timeline(imu, fixes, attitude, trajectory, *levers, provenance)
+
+
+_GNSS = ("fix", "velocity")
+
+
+def hash_file(path: str) -> tuple[int, str]:
+    """Size [bytes] and SHA-256 of a file, or of the files of a folder in the order of their names."""
+    files = sorted(part for part in Path(path).rglob("*") if part.is_file()) if Path(path).is_dir() else [Path(path)]
+    digest, size = sha256(), 0
+    for part in files:
+        with part.open("rb") as file:
+            while block := file.read(_BLOCK):
+                digest.update(block)
+                size += len(block)
+    return size, digest.hexdigest()
+
+
+def _read_tables(logs: Sequence[Log], choices: Sequence[Choice], progress: Progress | None) -> dict[tuple[int, str], Table]:
+    sizes = [Path(log.path).stat().st_size for log in logs]
+    tables: dict[tuple[int, str], Table] = {}
+    done = 0
+    for log, size in zip(logs, sizes, strict=True):
+        names = tuple(dict.fromkeys(choice.channel.name for choice in choices if choice.log is log))
+        if names:
+            tables |= {(id(log), name): table for name, table in log.read(names).items()}
+        done += size
+        if progress is not None:
+            progress(done / max(sum(sizes), 1))
+    return tables
+
+
+def _time_use(source: Source) -> ChannelUse:
+    rejected = dict(source.table.rejected)
+    read = source.table.read
+    return ChannelUse(
+        source.channel.name, source.file, source.channel.type, "time", read, read - sum(rejected.values()), rejected
+    )
+
+
+def _complete(logs: Sequence[Log], uses: Sequence[ChannelUse]) -> tuple[ChannelUse, ...]:
+    """The accounting in the order of the files, with the channels that serve nothing."""
+    complete: list[ChannelUse] = []
+    for path, log in {log.path: log for log in logs}.items():
+        for channel in log.channels():
+            own = [use for use in uses if use.file == path and use.name == channel.name]
+            complete += own or [ChannelUse(channel.name, path, channel.type, "unused", 0, 0)]
+    return tuple(complete)
+
+
+def _reference_lever(settings: InputSettings) -> np.ndarray:
+    """Fixes that serve as the reference describe the antenna."""
+    return np.array(settings.fix.lever_arm_m if settings.reference.from_fixes else settings.reference.lever_arm_m)
+
+
+def _names(logs: Sequence[Log]) -> str:
+    return ", ".join(log.path for log in logs)

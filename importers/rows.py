@@ -1,0 +1,64 @@
+"""Rows: the messages of a channel in terms of navigation, before time bases, units and axes are settled."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navreplay.timeline import Floats
+
+__all__ = ["NO_FIX", "Frame", "Rows", "diagonal_covariance", "status_codes"]
+
+NO_FIX = -1
+"""Status of a row without a fix; others are of FixStatus."""
+
+Frame = Literal["auto", "ned", "enu", "ecef"]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Rows:
+    """What the messages of one channel say, each field (n, ...) or None where the type has no such field.
+
+    gyro, accel: (n, 3) in the sensor's axes and units; sensor_axes: where those axes point unless told otherwise;
+    units_known: they are rad/s and m/s^2 for certain; means: each sample is the mean over its interval. lla: (n, 3) [rad,
+    rad, m], or local: (n, 3) east, north, up of a local origin [m]. vel: (n, 3) [m/s] in vel_frame. cov_pos: (n, 3, 3) NED.
+    cov_vel: (n, 3, 3) in vel_frame. status: (n,) int8 of FixStatus or NO_FIX. q: (n, 4) scalar first, body to navigation;
+    ros_attitude: of an FLU body in ENU instead of FRD in NED.
+    """
+
+    gyro: Floats | None = None
+    accel: Floats | None = None
+    sensor_axes: str = "frd"
+    units_known: bool = True
+    means: bool = False
+    lla: Floats | None = None
+    local: Floats | None = None
+    vel: Floats | None = None
+    vel_frame: Frame = "ned"
+    cov_pos: Floats | None = None
+    cov_vel: Floats | None = None
+    status: NDArray[np.int8] | None = None
+    q: Floats | None = None
+    ros_attitude: bool = False
+
+
+def diagonal_covariance(std: Floats) -> Floats:
+    """Covariances (n, 3, 3) of standard deviations (n, 3); all NaN where one of them is NaN or zero (zero means unknown)."""
+    known = (np.isfinite(std) & (std > 0)).all(axis=1)
+    cov = np.zeros((len(std), 3, 3))
+    cov[:, range(3), range(3)] = std**2
+    cov[~known] = np.nan
+    return cov
+
+
+def status_codes(values: np.ndarray, meaning: Mapping[str, int]) -> NDArray[np.int8]:
+    """Status codes (n,) of texts or numbers (n,), by the text of each; 0 (unknown) where the text has no meaning."""
+    if values.dtype.kind in "fiu":
+        texts, inverse = np.unique(values, return_inverse=True)
+        names = [f"{value:g}" for value in texts]
+    else:
+        texts, inverse = np.unique(values.astype(str), return_inverse=True)
+        names = [str(value).strip() for value in texts]
+    return np.array([meaning.get(name, 0) for name in names], dtype=np.int8)[inverse]

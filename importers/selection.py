@@ -1,0 +1,125 @@
+"""Which channel serves which purpose: by type where that is unambiguous, by the settings otherwise."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from importers.log import Channel, Log
+from importers.messages import find_kind
+from importers.settings import InputSettings
+from navreplay.timeline import LogError
+
+__all__ = ["NOTHING", "SETTING", "Choice", "candidates", "choose_channels"]
+
+SETTING = {
+    "imu": "input.imu.channel",
+    "fix": "input.fix.channel",
+    "velocity": "input.fix.velocity_channel",
+    "attitude": "input.attitude.channel",
+    "reference": "input.reference.channel",
+}
+"""The setting that names the channel of a role."""
+NOTHING = "none"
+"""In place of a channel's name: no channel is to serve."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Choice:
+    """A channel of a log, chosen for a role."""
+
+    log: Log
+    channel: Channel
+    role: str
+
+
+def candidates(logs: Sequence[Log], role: str) -> list[Choice]:
+    """Channels of a type that can serve as a role, empty ones last resort: left out where another holds messages."""
+    found = [
+        Choice(log, channel, role)
+        for log in logs
+        for channel in log.channels()
+        if (kind := find_kind(channel.type)) is not None and role in kind.roles
+    ]
+    filled = [choice for choice in found if choice.channel.count != 0]
+    return filled or found
+
+
+def choose_channels(logs: Sequence[Log], settings: InputSettings, reference: Log | None) -> tuple[Choice, ...]:
+    """The channels of every role. Raises LogError where a named channel is missing or a choice is ambiguous."""
+    named = {
+        "imu": settings.imu.channel,
+        "fix": settings.fix.channel,
+        "velocity": settings.fix.velocity_channel,
+        "attitude": settings.attitude.channel,
+    }
+    chosen: list[Choice] = []
+    for role, name in named.items():
+        chosen += _choose(logs, role, name)
+    if not settings.reference.from_fixes:
+        taken = {(id(choice.log), choice.channel.name) for choice in chosen}
+        chosen += _choose_reference(logs, settings.reference.channel, reference, taken)
+    chosen += candidates(logs, "time")
+    return tuple(chosen)
+
+
+def _choose(logs: Sequence[Log], role: str, name: str | None) -> list[Choice]:
+    if name == NOTHING:
+        return []
+    if name is not None:
+        return _named(logs, role, name)
+    found = [choice for choice in candidates(logs, role) if _automatic(choice.channel, role)]
+    return _only_one(found, role)
+
+
+def _automatic(channel: Channel, role: str) -> bool:
+    kind = find_kind(channel.type)
+    return kind is not None and kind.automatic and kind.roles[0] == role
+
+
+def _choose_reference(
+    logs: Sequence[Log], name: str | None, reference: Log | None, taken: set[tuple[int, str]]
+) -> list[Choice]:
+    """From the reference file whatever can serve; from the logs only what is meant as a reference."""
+    searched = logs if reference is None else [reference]
+    if name is not None:
+        return _named(searched, "reference", name)
+    found = candidates(searched, "reference")
+    if reference is None:
+        found = [choice for choice in found if _automatic(choice.channel, "reference")]
+        return _only_one([choice for choice in found if (id(choice.log), choice.channel.name) not in taken], "reference")
+    if not found:
+        types = ", ".join(f"{channel.name} ({channel.type})" for channel in reference.channels()) or "nothing"
+        raise LogError(f"{reference.path}: no channel can serve as a reference; it holds {types}")
+    meant = [choice for choice in found if _automatic(choice.channel, "reference")]
+    absolute = [choice for choice in found if _automatic(choice.channel, "fix")]
+    return _only_one(meant or absolute or found, "reference")
+
+
+def _named(logs: Sequence[Log], role: str, name: str) -> list[Choice]:
+    found = [Choice(log, channel, role) for log in logs for channel in log.channels() if channel.name == name]
+    place = ", ".join(Path(log.path).name for log in logs)
+    if not found:
+        there = ", ".join(channel.name for log in logs for channel in log.channels()) or "no channel at all"
+        raise LogError(f"{place}: has no channel {name}, which {SETTING[role]} names; there is {there}")
+    for choice in found:
+        kind = find_kind(choice.channel.type)
+        if kind is None or role not in kind.roles:
+            could = ", ".join(sorted({other.channel.name for other in candidates(logs, role)})) or "none"
+            raise LogError(
+                f"{place}: channel {name} is {choice.channel.type}, which cannot serve as {role} ({SETTING[role]}); "
+                f"channels that can: {could}"
+            )
+    return found
+
+
+def _only_one(found: list[Choice], role: str) -> list[Choice]:
+    """One channel, which may continue from file to file under the same name and type."""
+    names = {(choice.channel.name, choice.channel.type) for choice in found}
+    if len(names) > 1:
+        listed = "; ".join(f"{name} ({type})" for name, type in sorted(names))
+        example = sorted(names)[0][0]
+        raise LogError(
+            f"{len(names)} channels can serve as {role}: {listed}. Choose one with {SETTING[role]}, "
+            f"for instance --set {SETTING[role]}={example}"
+        )
+    return found
