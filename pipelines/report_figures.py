@@ -73,7 +73,7 @@ def bend_of(*series: Floats) -> float | None:
     if len(magnitudes) == 0:
         return None
     usual, large = np.percentile(magnitudes, [50, 99.5])
-    return float(10 ** np.floor(np.log10(usual))) if large > 30 * usual else None
+    return float(10 ** np.floor(np.log10(usual))) if large > 15 * usual else None
 
 
 def _plot_track(result: RunResult) -> Plot:

@@ -118,7 +118,7 @@ def _error_tables(errors: Mapping[str, Any]) -> list[Table]:
             table = errors[stretch][quantity]
             for component, figures in table.items():
                 if component != "unit" and figures["count"]:
-                    rows.append((words, component, *(figure_text(figures[name]) for name in _STATISTICS)))
+                    rows.append((words, component.replace("3d", "3-D"), *(figure_text(figures[name]) for name in _STATISTICS)))
         title = f"{quantity.capitalize()} error [{first['unit']}]"
         tables.append(
             Table(

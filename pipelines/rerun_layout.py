@@ -1,0 +1,55 @@
+"""The layout with which a recording opens: track and map on the left, plots and events on the right."""
+
+from typing import NamedTuple
+
+import rerun.blueprint as rrb
+
+__all__ = ["Stack", "build_layout"]
+
+Point = tuple[float, float, float]
+
+
+class Stack(NamedTuple):
+    """Plots of one quantity, one per label, one above the other. origin: entity under which the labels lie."""
+
+    name: str
+    origin: str
+    labels: tuple[str, ...]
+    unit: str
+
+
+def _arrange(stack: Stack) -> rrb.Vertical:
+    views = [
+        rrb.TimeSeriesView(
+            name=f"{label} [{stack.unit}]",
+            origin=f"{stack.origin}/{label}",
+            axis_x=rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal),
+            plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop),
+        )
+        for label in stack.labels
+    ]
+    return rrb.Vertical(contents=views, name=stack.name)
+
+
+def build_layout(stacks: tuple[Stack, ...], eye: Point, target: Point, zoom: float) -> rrb.Blueprint:
+    """eye, target [m]: where the 3-D view looks from and at, east, north, up. zoom: of the map, in web Mercator levels."""
+    track = rrb.Spatial3DView(
+        name="Track (east, north, up)",
+        origin="/local",
+        eye_controls=rrb.EyeControls3D(position=eye, look_target=target, eye_up=(0.0, 0.0, 1.0)),
+        line_grid=rrb.LineGrid3D(visible=True),
+    )
+    chart = rrb.MapView(name="Map", origin="/map", zoom=zoom, background=rrb.MapProvider.OpenStreetMap)
+    plots = rrb.Tabs(contents=[_arrange(stack) for stack in stacks], active_tab=0, name="Plots")
+    events = rrb.TextLogView(name="Events", origin="/events")
+    return rrb.Blueprint(
+        rrb.Horizontal(
+            rrb.Vertical(track, chart, row_shares=[3, 2]),
+            rrb.Vertical(plots, events, row_shares=[4, 1]),
+            column_shares=[1, 1],
+        ),
+        rrb.TimePanel(state="collapsed", timeline="elapsed"),
+        rrb.SelectionPanel(state="hidden"),
+        rrb.BlueprintPanel(state="hidden"),
+        auto_views=False,
+    )
