@@ -1,0 +1,37 @@
+"""Synthetic log, every writer, importer: equal to the last bit the format can hold (degrees cost a unit in the last place)."""
+
+import numpy as np
+import pytest
+
+from importers.load import load_timeline
+from synthetic_logs import SCENARIOS, simulate, write
+
+CAR = simulate(SCENARIOS["car-short"], 11)
+
+
+def assert_same_log(timeline, log):
+    assert timeline.imu.increments == log.imu.increments
+    for name in ("t_ns", "gyro", "accel"):
+        np.testing.assert_array_equal(getattr(timeline.imu, name), getattr(log.imu, name))
+    for name in ("t_ns", "vel_n", "cov_pos", "status"):
+        np.testing.assert_array_equal(getattr(timeline.fixes, name), getattr(log.fixes, name))
+    np.testing.assert_allclose(timeline.fixes.lla, log.fixes.lla, rtol=3e-16)
+    np.testing.assert_array_equal(timeline.reference.t_ns, log.truth.t_ns)
+    np.testing.assert_allclose(timeline.reference.lla, log.truth.lla, rtol=3e-16)
+    np.testing.assert_array_equal(timeline.reference.vel_n, log.truth.vel_n)
+    np.testing.assert_allclose(timeline.reference.q_nb, log.truth.q_nb, atol=3e-16)
+
+
+@pytest.mark.parametrize("name", ["log.mcap", "log.bag", "log.db3", "log", "log.csv"])
+def test_car_comes_back(tmp_path, name):
+    *paths, truth = write(CAR, tmp_path / name)
+    timeline = load_timeline(paths, reference=truth)
+    assert_same_log(timeline, CAR)
+    told_velocity = CAR.fixes.cov_vel if name == "log.csv" else np.full_like(CAR.fixes.cov_vel, np.nan)
+    np.testing.assert_allclose(timeline.fixes.cov_vel, told_velocity, rtol=3e-16)
+
+
+def test_increments_come_back_as_increments_from_csv(tmp_path):
+    log = simulate(SCENARIOS["aircraft-spiral"], 11)
+    *paths, truth = write(log, tmp_path / "log.csv")
+    assert_same_log(load_timeline(paths, reference=truth), log)
