@@ -1,0 +1,31 @@
+"""The bytes of a log file, mapped rather than read."""
+
+import mmap
+from pathlib import Path
+
+import numpy as np
+
+from importers.message_blocks import Buffer
+from navreplay.timeline import LogError
+
+__all__ = ["map_file"]
+
+
+def map_file(path: str, magic: bytes, format_name: str) -> Buffer:
+    """All bytes of a file, read-only, paged in as they are touched.
+
+    Raises LogError for a missing or unreadable file, an empty one, and one that does not begin with the format's magic.
+    """
+    try:
+        with Path(path).open("rb") as file:
+            size = file.seek(0, 2)
+            if size == 0:
+                raise LogError(f"{path}: the file is empty; was the recording stopped before anything was written?")
+            file.seek(0)
+            if file.read(len(magic)) != magic:
+                raise LogError(
+                    f"{path}: not {format_name}: the file does not begin as one; wrong file, or damaged in its first bytes"
+                )
+            return np.frombuffer(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ), dtype=np.uint8)
+    except OSError as error:
+        raise LogError(f"{path}: cannot be read: {error.strerror}") from error

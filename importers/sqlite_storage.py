@@ -1,0 +1,115 @@
+"""Reader of one sqlite3 storage file (.db3) of a ROS 2 bag."""
+
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+
+from importers.channel_reading import read_tables, require_channels
+from importers.file_bytes import map_file
+from importers.log import Channel, Table
+from importers.message_blocks import Block, Decoder
+from navreplay.timeline import LogError
+
+__all__ = ["SqliteStorage"]
+
+_MAGIC = b"SQLite format 3\0"
+_BLOCK_MESSAGES = 1 << 13
+_LANGUAGES = {"ros2msg": "msg", "ros2idl": "idl"}
+
+
+class SqliteStorage:
+    """A .db3 file as a `Log`. Of a damaged file the messages up to the damage are read. Raises LogError when it is no sqlite3
+    database, or not one of ROS 2."""
+
+    format = "ros2"
+
+    def __init__(self, path: str) -> None:
+        self.path = str(path)
+        self.notes: tuple[str, ...] = ()
+        map_file(self.path, _MAGIC, "a sqlite3 storage file of ROS 2")
+        try:
+            self._load()
+        except sqlite3.DatabaseError as error:
+            raise LogError(
+                f"{self.path}: no readable ROS 2 storage ({error}); is the file damaged, or of another program?"
+            ) from error
+
+    def channels(self) -> tuple[Channel, ...]:
+        """See `Log`."""
+        channels = {name: Channel(name, kind, form, None) for name, kind, form in self._topics.values()}
+        if self._counts is None:
+            return tuple(channels.values())
+        return tuple(
+            Channel(name, channel.type, channel.encoding, sum(self._counts.get(number, 0) for number in self._numbers(name)))
+            for name, channel in channels.items()
+        )
+
+    def read(self, names: tuple[str, ...]) -> dict[str, Table]:
+        """See `Log`."""
+        require_channels(self.path, names, self.channels())
+        numbers = {name: self._numbers(name) for name in names}
+        return read_tables(self.path, numbers, self._decoder, self._messages, self._counts)
+
+    def _connect(self) -> sqlite3.Connection:
+        # Without a write-ahead log beside it nobody writes to the file, so it need not be locked (nor its folder writable).
+        writing = Path(f"{self.path}-wal").exists()
+        return sqlite3.connect(f"{Path(self.path).absolute().as_uri()}?{'mode=ro' if writing else 'immutable=1'}", uri=True)
+
+    def _load(self) -> None:
+        with closing(self._connect()) as database:
+            rows = database.execute("SELECT id, name, type, serialization_format FROM topics ORDER BY id").fetchall()
+            self._topics: dict[int, tuple[str, str, str]] = {row[0]: (str(row[1]), str(row[2]), str(row[3])) for row in rows}
+            self._definitions: dict[str, tuple[str, str]] = {}
+            if database.execute("SELECT 1 FROM sqlite_master WHERE name = 'message_definitions'").fetchone():
+                query = "SELECT topic_type, encoded_message_definition, encoding FROM message_definitions"
+                for kind, text, encoding in database.execute(query):
+                    self._definitions[str(kind)] = (str(text), _LANGUAGES.get(encoding, "msg"))
+            self._counts: dict[int, int] | None = None
+            try:
+                self._counts = dict(database.execute("SELECT topic_id, count(*) FROM messages GROUP BY topic_id"))
+            except sqlite3.DatabaseError as error:
+                self._note(f"the messages cannot be counted ({error}); the file is damaged")
+
+    def _numbers(self, name: str) -> list[int]:
+        return [number for number, topic in self._topics.items() if topic[0] == name]
+
+    def _decoder(self, number: int) -> Decoder:
+        from importers.ros_definitions import find_type
+        from importers.ros_messages import RosDecoder
+
+        _, kind, encoding = self._topics[number]
+        if encoding != "cdr":
+            raise LogError(f"serialization format {encoding!r} is not supported; cdr is")
+        return RosDecoder(find_type(kind, *self._definitions.get(kind, ("", "msg")), "cdr"), "cdr")
+
+    def _note(self, text: str) -> None:
+        if text not in self.notes:
+            self.notes = (*self.notes, text)
+
+    def _messages(self, wanted: set[int]) -> Iterator[Block]:
+        marks = ",".join("?" * len(wanted))
+        query = f"SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({marks}) ORDER BY id"
+        with closing(self._connect()) as database:
+            rows: list[tuple[int, int, bytes]] = []
+            try:
+                for row in database.execute(query, tuple(wanted)):
+                    if isinstance(row[1], int) and isinstance(row[2], bytes):
+                        rows.append(row)
+                    if len(rows) == _BLOCK_MESSAGES:
+                        yield _block(rows)
+                        rows = []
+            except sqlite3.DatabaseError as error:
+                self._note(f"reading stopped at damage in the file ({error}); messages before it were kept")
+            if rows:
+                yield _block(rows)
+
+
+def _block(rows: list[tuple[int, int, bytes]]) -> Block:
+    topics, times, messages = zip(*rows, strict=True)
+    length = np.array([len(message) for message in messages], dtype=np.int64)
+    stop = np.cumsum(length)
+    buffer = np.frombuffer(b"".join(messages), dtype=np.uint8)
+    return Block(buffer, np.array(topics, dtype=np.int64), np.array(times, dtype=np.int64), stop - length, stop)
