@@ -127,7 +127,9 @@ def test_means_equal_the_integral_of_the_rates():
         np.testing.assert_allclose(means, blocks / 50, atol=2e-8)
 
 
-@pytest.mark.parametrize(("name", "rate"), [("static", 100.0), ("car-city", 100.0), ("car-highway", 100.0), ("uav-flight", 400.0)])
+@pytest.mark.parametrize(
+    ("name", "rate"), [("static", 100.0), ("car-city", 100.0), ("car-highway", 100.0), ("uav-flight", 400.0)]
+)
 def test_ideal_imu_through_the_mechanisation_returns_the_trajectory_to_millimetres(name, rate):
     journey = replace(SCENARIOS[name].journey, increments=True, imu_rate=rate, duration=600.0)
     imu = ideal_imu(journey)
