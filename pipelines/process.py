@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from importers import load_timeline, preflight
 from importers.findings import Finding
+from importers.load import load_timeline
+from importers.preflight import preflight
 from navreplay.filters.presets import build_method
 from navreplay.filters.run import run_filter
 from navreplay.metrics import evaluate, find_outages
@@ -47,8 +48,8 @@ def process(paths: Sequence[Path], config: Config, progress: Progress | None = N
 def read_drive(paths: Sequence[Path], config: Config, progress: Progress | None = None) -> Drive:
     """The logs merged into one timeline and checked. Raises LogError with the first error that preflight finds."""
     timing: dict[str, float] = {}
-    with _stage("reading", timing, progress):
-        timeline = load_timeline(paths, config.input)
+    with _stage("reading", timing, progress) as tell:
+        timeline = load_timeline(paths, config.input, progress=tell)
     with _stage("checking", timing, progress):
         findings = preflight(timeline)
     for finding in findings:
