@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+import rerun as rr
 import rerun.blueprint as rrb
 
 __all__ = ["Stack", "build_layout"]
@@ -18,12 +19,12 @@ class Stack(NamedTuple):
     unit: str
 
 
-def _arrange(stack: Stack) -> rrb.Vertical:
+def _arrange(stack: Stack, whole: rr.TimeRange) -> rrb.Vertical:
     views = [
         rrb.TimeSeriesView(
             name=f"{label} [{stack.unit}]",
             origin=f"{stack.origin}/{label}",
-            axis_x=rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal),
+            axis_x=rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal, view_range=whole),
             plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop),
         )
         for label in stack.labels
@@ -31,8 +32,13 @@ def _arrange(stack: Stack) -> rrb.Vertical:
     return rrb.Vertical(contents=views, name=stack.name)
 
 
-def build_layout(stacks: tuple[Stack, ...], eye: Point, target: Point, zoom: float) -> rrb.Blueprint:
-    """eye, target [m]: where the 3-D view looks from and at, east, north, up. zoom: of the map, in web Mercator levels."""
+def build_layout(stacks: tuple[Stack, ...], duration_s: float, eye: Point, target: Point, zoom: float) -> rrb.Blueprint:
+    """duration_s: of the drive, all of which the plots show. eye, target [m]: where the 3-D view looks from and at, east, north,
+    up. zoom: of the map, in web Mercator levels."""
+    margin = 0.02 * duration_s
+    whole = rr.TimeRange(
+        start=rr.TimeRangeBoundary.absolute(seconds=-margin), end=rr.TimeRangeBoundary.absolute(seconds=duration_s + margin)
+    )
     track = rrb.Spatial3DView(
         name="Track (east, north, up)",
         origin="/local",
@@ -40,8 +46,9 @@ def build_layout(stacks: tuple[Stack, ...], eye: Point, target: Point, zoom: flo
         line_grid=rrb.LineGrid3D(visible=True),
     )
     chart = rrb.MapView(name="Map", origin="/map", zoom=zoom, background=rrb.MapProvider.OpenStreetMap)
-    plots = rrb.Tabs(contents=[_arrange(stack) for stack in stacks], active_tab=0, name="Plots")
-    events = rrb.TextLogView(name="Events", origin="/events")
+    plots = rrb.Tabs(contents=[_arrange(stack, whole) for stack in stacks], active_tab=0, name="Plots")
+    columns = [rrb.encodings.TextLogColumn(kind, visible=kind != "entitypath") for kind in ("entitypath", "loglevel", "body")]
+    events = rrb.TextLogView(name="Events", origin="/events", columns=rrb.TextLogColumns(text_log_columns=columns))
     return rrb.Blueprint(
         rrb.Horizontal(
             rrb.Vertical(track, chart, row_shares=[3, 2]),

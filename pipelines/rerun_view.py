@@ -68,11 +68,11 @@ def _local(origin: Floats, lla: Floats) -> Floats:
 def _layout(result: RunResult, track: Floats) -> Any:
     low, high = track.min(axis=0), track.max(axis=0)
     middle, size = (low + high) / 2, max(float((high - low)[:2].max()), 10.0)
-    eye = middle + np.array([0.0, -0.55, 0.85]) * size
+    eye = middle + np.array([0.0, -0.5, 0.75]) * size
     metres_per_degree = 111_320.0
-    zoom = np.clip(np.log2(360 * metres_per_degree * np.cos(result.solution.lla[0, 0]) / (size * 1.2)), 1, 18)
-    east, north, up = middle.tolist()
-    return build_layout(list_stacks(result), tuple(eye.tolist()), (east, north, up), float(zoom))
+    zoom = np.clip(np.log2(360 * metres_per_degree * np.cos(result.solution.lla[0, 0]) / (size * 0.7)), 1, 18)
+    duration_s = float(result.solution.t_ns[-1] - result.solution.t_ns[0]) / 1e9
+    return build_layout(list_stacks(result), duration_s, tuple(eye.tolist()), tuple(middle.tolist()), float(zoom))
 
 
 def _send_track(recording: rr.RecordingStream, solution: Solution, track: Floats) -> None:
@@ -120,10 +120,14 @@ def _send_outage_tracks(recording: rr.RecordingStream, result: RunResult, track:
     inside = [(solution.t_ns >= e.outage.start_ns) & (solution.t_ns <= e.outage.end_ns) for e in outage_errors(result)]
     strips = [track[rows] for rows in inside if rows.sum() > 1]
     if strips:
-        recording.log("/local/outages", rr.LineStrips3D(strips, colors=_RED, radii=rr.Radius.ui_points(2)), static=True)
+        recording.log(
+            "/local/solution_in_outages", rr.LineStrips3D(strips, colors=_RED, radii=rr.Radius.ui_points(2)), static=True
+        )
         degrees = [np.degrees(solution.lla[rows, :2]) for rows in inside if rows.sum() > 1]
         recording.log(
-            "/map/outages", rr.GeoLineStrings(lat_lon=degrees, colors=_RED, radii=rr.Radius.ui_points(2.5)), static=True
+            "/map/solution_in_outages",
+            rr.GeoLineStrings(lat_lon=degrees, colors=_RED, radii=rr.Radius.ui_points(2.5)),
+            static=True,
         )
 
 

@@ -1,0 +1,164 @@
+"""The report of one drive through several methods: one table per quantity, errors drawn over each other."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from navreplay.earth import ned_between
+from pipelines.report import Report, build_report
+from pipelines.report_figures import Plot, bend_of, outage_shades
+from pipelines.report_tables import Figure, Table, figure_text
+from pipelines.result import RunResult
+from pipelines.svg import Layer, Panel, draw_map, draw_time_panels
+
+__all__ = ["build_comparison", "comparison_figures", "comparison_plots", "comparison_tables"]
+
+_SCHEMA = "navreplay comparison 1"
+_COMMON = ("versions", "channels", "files", "assumptions", "findings", "configuration")
+_OWN = ("drive", "errors", "nees", "within_3_sigma", "nis", "innovations", "outages", "events", "timing_s")
+_STRETCHES = {"all": "whole drive", "outside": "outside outages", "inside": "inside outages"}
+_STYLES = tuple(f"c{number}" for number in range(1, 7))
+
+
+def build_comparison(labels: Sequence[str], results: Sequence[RunResult]) -> Report:
+    """What the runs share once (of the first run), and by label under ``methods`` what each one reports of its own."""
+    reports = [build_report(result) for result in results]
+    methods = {label: {key: report[key] for key in _OWN} for label, report in zip(labels, reports, strict=True)}
+    return {"schema": _SCHEMA, **{key: reports[0][key] for key in _COMMON}, "methods": methods}
+
+
+def comparison_figures(report: Report) -> tuple[Figure, ...]:
+    """A headline per method: its horizontal error, and where there were outages that at their ends."""
+    figures = []
+    for label, method in report["methods"].items():
+        ends = method["outages"]["summary"]["end_horizontal"]
+        context = (
+            f"at outage ends {figure_text(ends['p50'], 'm')} median, {figure_text(ends['p95'], 'm')} 95 %"
+            if ends["count"]
+            else ""
+        )
+        if method["errors"] is not None:
+            stretch = "outside" if ends["count"] and method["errors"]["outside"]["position"]["horizontal"]["count"] else "all"
+            rms = figure_text(method["errors"][stretch]["position"]["horizontal"]["rms"], "m")
+            figures.append(Figure(label, rms, f"horizontal RMS {_STRETCHES[stretch]}; {context}".rstrip("; ")))
+    return tuple(figures)
+
+
+def comparison_tables(report: Report) -> tuple[Table, ...]:
+    """One table per quantity, a row per method."""
+    methods = report["methods"]
+    tables = []
+    first = next(iter(methods.values()))
+    if first["errors"] is not None:
+        for quantity in first["errors"]["all"]:
+            tables += [table for stretch in _STRETCHES if (table := _error_table(report, quantity, stretch)).rows]
+    tables += [table for table in (_outage_table(report), _consistency_table(report), _use_table(report)) if table.rows]
+    seconds = tuple((label, figure_text(sum(method["timing_s"].values()))) for label, method in methods.items())
+    return (*tables, Table("Time spent", ("method", "seconds"), seconds, "Reading included, which is done once for all."))
+
+
+def _error_table(report: Report, quantity: str, stretch: str) -> Table:
+    rows, components, unit = [], (), ""
+    for label, method in report["methods"].items():
+        table = method["errors"][stretch].get(quantity)
+        if table is None:
+            continue
+        unit = table["unit"]
+        components = tuple(name for name in table if name != "unit")
+        figures = [figure_text(table[name][statistic]) for name in components for statistic in ("rms", "p95")]
+        if table[components[0]]["count"]:
+            rows.append((label, *figures, str(table[components[0]]["count"])))
+    heads = [f"{name.replace('3d', '3-D')} {statistic}" for name in components for statistic in ("rms", "95 %")]
+    title = f"{quantity.capitalize()} error {_STRETCHES[stretch]} [{unit}]"
+    return Table(title, ("method", *heads, "epochs"), tuple(rows))
+
+
+def _outage_table(report: Report) -> Table:
+    rows = []
+    names = ("end_horizontal", "end_3d", "max_horizontal")
+    for label, method in report["methods"].items():
+        summary = method["outages"]["summary"]
+        if summary["end_horizontal"]["count"]:
+            figures = [figure_text(summary[name][statistic]) for name in names for statistic in ("p50", "p95", "max")]
+            rows.append((label, *figures, str(summary["end_horizontal"]["count"])))
+    words = ("end horizontal", "end 3-D", "largest horizontal")
+    header = ("method", *(f"{name} {statistic}" for name in words for statistic in ("median", "95 %", "max")), "outages")
+    return Table("Outages [m]", header, tuple(rows), "Errors at the end are those before the next fix corrects.")
+
+
+def _consistency_table(report: Report) -> Table:
+    rows = []
+    for label, method in report["methods"].items():
+        judged = [(f"NEES {name}", values) for name, values in (method["nees"] or {}).items()]
+        judged += [(f"NIS {name}", values) for name, values in method["nis"].items()]
+        for name, values in judged:
+            share = "–" if values["share_inside"] is None else f"{100 * values['share_inside']:.1f} %"
+            rows.append((name, label, figure_text(values["dof"]), figure_text(values["mean"]), share))
+    rows.sort(key=lambda row: row[0])
+    return Table("Consistency", ("", "method", "expected", "mean", "inside 95 % bounds"), tuple(rows))
+
+
+def _use_table(report: Report) -> Table:
+    rows = tuple(
+        (kind, label, str(series["read"]), str(series["used"]), str(series["read"] - series["used"]))
+        for label, method in report["methods"].items()
+        for kind, series in method["innovations"].items()
+    )
+    return Table("Measurements", ("", "method", "read", "used", "rejected"), tuple(sorted(rows, key=lambda row: row[0])))
+
+
+def comparison_plots(labels: Sequence[str], results: Sequence[RunResult]) -> tuple[Plot, ...]:
+    """The tracks, and for each quantity the errors of all methods."""
+    styles = [_STYLES[i % len(_STYLES)] for i in range(len(labels))]
+    legend = tuple((f"line {style}", label) for style, label in zip(styles, labels, strict=True))
+    plots = [_plot_tracks(labels, styles, results, legend)]
+    judged = [result.evaluation for result in results if result.evaluation is not None]
+    for quantity in judged[0].errors if judged else ():
+        plots.append(_plot_errors(quantity, labels, styles, results, legend))
+    return tuple(plots)
+
+
+def _plot_tracks(
+    labels: Sequence[str], styles: Sequence[str], results: Sequence[RunResult], legend: tuple[tuple[str, str], ...]
+) -> Plot:
+    origin = results[0].solution.lla[0]
+    layers = []
+    reference = results[0].timeline.reference
+    if reference is not None:
+        where = ned_between(origin, reference.lla)
+        layers.append(Layer("line", where[:, 1], where[:, 0], "reference", "reference"))
+        legend = (("line reference", "reference"), *legend)
+    for label, style, result in zip(labels, styles, results, strict=True):
+        track = ned_between(origin, result.solution.lla)
+        layers.append(Layer("line", track[:, 1], track[:, 0], style, label))
+    lat, lon = np.degrees(origin[:2])
+    return Plot("Track", f"East and north of the first position, {lat:.6f}°, {lon:.6f}°.", legend, draw_map(layers))
+
+
+def _plot_errors(
+    quantity: str,
+    labels: Sequence[str],
+    styles: Sequence[str],
+    results: Sequence[RunResult],
+    legend: tuple[tuple[str, str], ...],
+) -> Plot:
+    start = min(int(result.solution.t_ns[0]) for result in results)
+    duration = max(int(result.solution.t_ns[-1]) - start for result in results) / 1e9
+    drawn = [
+        (label, style, result.evaluation.t_ns, result.evaluation.errors[quantity])
+        for label, style, result in zip(labels, styles, results, strict=True)
+        if result.evaluation is not None and quantity in result.evaluation.errors
+    ]
+    first = drawn[0][3]
+    factor, unit = (np.degrees(1.0), "deg") if first.unit == "rad" else (1.0, first.unit)
+    bend = bend_of(*(series.error * factor for _, _, _, series in drawn))
+    panels = []
+    for i, axis in enumerate(first.labels):
+        layers = [
+            Layer("line", (t_ns - start) / 1e9, series.error[:, i] * factor, style, label)
+            for label, style, t_ns, series in drawn
+        ]
+        panels.append(Panel(f"{axis} [{unit}]", tuple(layers), bend))
+    note = "Estimated minus reference." + ("" if bend is None else " Signed logarithmic scale.")
+    svg = draw_time_panels(panels, duration, outage_shades(results[0]))
+    return Plot(f"{quantity.capitalize()} error", note, legend, svg)

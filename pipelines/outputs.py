@@ -1,0 +1,92 @@
+"""Everything a run leaves in its folder; each file appears complete or not at all."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from navreplay.timeline import LogError
+from pipelines.comparison import build_comparison, comparison_figures, comparison_plots, comparison_tables
+from pipelines.report import build_report, dump_json
+from pipelines.report_figures import report_plots
+from pipelines.report_html import render_html
+from pipelines.report_markdown import render_markdown
+from pipelines.report_tables import headline_figures, report_tables
+from pipelines.result import RunResult
+from pipelines.solution_csv import utc_text, write_solution_csv
+from pipelines.spec import dump_toml
+
+__all__ = ["label_methods", "write_comparison", "write_outputs"]
+
+
+def write_outputs(result: RunResult, out_dir: Path) -> dict[str, Path]:
+    """Writes solution.csv, report.json, report.md, report.html, config.toml and, unless the configuration says otherwise,
+    recording.rrd. Returns the paths by name. Raises LogError when the folder cannot be written."""
+    report = build_report(result)
+    title, subtitle = _title(result)
+    figures, tables = headline_figures(report), report_tables(report)
+    html = render_html(title, subtitle, figures, report_plots(result), tables, report["configuration"])
+    markdown = render_markdown(title, figures, tables)
+    writers: dict[str, Callable[[Path], object]] = {
+        "solution.csv": lambda path: write_solution_csv(path, result.solution),
+        "report.json": lambda path: path.write_text(dump_json(report), encoding="utf-8"),
+        "report.md": lambda path: path.write_text(markdown, encoding="utf-8"),
+        "report.html": lambda path: path.write_text(html, encoding="utf-8"),
+        "config.toml": lambda path: path.write_text(dump_toml(result.config), encoding="utf-8"),
+    }
+    if result.config.output.recording:
+        from pipelines.rerun_view import write_recording  # loading rerun takes a second, and not every run records
+
+        writers["recording.rrd"] = lambda path: write_recording(path, result)
+    return _write_files(out_dir, writers)
+
+
+def write_comparison(results: Sequence[RunResult], out_dir: Path) -> dict[str, Path]:
+    """Writes report.json, report.md and report.html of several methods on one drive, and each method's own outputs in a folder
+    named after it. Returns the paths of the common report by name. Raises LogError as `write_outputs` does."""
+    labels = label_methods(results)
+    for label, result in zip(labels, results, strict=True):
+        write_outputs(result, out_dir / label)
+    report = build_comparison(labels, results)
+    drive, subtitle = _title(results[0])
+    title = f"{drive}: {', '.join(labels)}"
+    figures, tables = comparison_figures(report), comparison_tables(report)
+    html = render_html(title, subtitle, figures, comparison_plots(labels, results), tables, report["configuration"])
+    markdown = render_markdown(title, figures, tables)
+    return _write_files(
+        out_dir,
+        {
+            "report.json": lambda path: path.write_text(dump_json(report), encoding="utf-8"),
+            "report.md": lambda path: path.write_text(markdown, encoding="utf-8"),
+            "report.html": lambda path: path.write_text(html, encoding="utf-8"),
+        },
+    )
+
+
+def label_methods(results: Sequence[RunResult]) -> tuple[str, ...]:
+    """The methods' names, numbered where one occurs twice."""
+    names = [result.solution.method for result in results]
+    return tuple(name if names.count(name) == 1 else f"{name}-{names[: i + 1].count(name)}" for i, name in enumerate(names))
+
+
+def _title(result: RunResult) -> tuple[str, str]:
+    files = [Path(file.path).name for file in result.timeline.provenance.files]
+    start, end = utc_text(result.solution.t_ns[[0, -1]])
+    return ", ".join(files) or "Drive", f"{start[:19].replace('T', ' ')} to {end[11:19]} UTC, method {result.solution.method}"
+
+
+def _write_files(out_dir: Path, writers: dict[str, Callable[[Path], object]]) -> dict[str, Path]:
+    try:
+        out_dir.mkdir(parents=True, exist_ok=True)
+        for name, write in writers.items():
+            _write_whole(out_dir / name, write)
+    except OSError as error:
+        raise LogError(f"{out_dir}: cannot write the results: {error.strerror or error}; choose another -o") from error
+    return {name: out_dir / name for name in writers}
+
+
+def _write_whole(path: Path, write: Callable[[Path], object]) -> None:
+    part = path.with_name(f".{path.name}.part")
+    try:
+        write(part)
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
