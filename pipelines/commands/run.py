@@ -22,6 +22,8 @@ def run(arguments: argparse.Namespace) -> None:
         if progress is not None:
             progress("writing", 0.0)
         outputs = write_outputs(result, arguments.out)
+    if "recording.rrd" not in outputs:
+        (arguments.out / "recording.rrd").unlink(missing_ok=True)  # of an earlier run, which --force overwrites
     if arguments.json:
         print(json.dumps(headline_figures(result) | {"outputs": {name: str(path) for name, path in outputs.items()}}, indent=2))
     elif not arguments.quiet:
