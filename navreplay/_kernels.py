@@ -77,10 +77,11 @@ def _step(x, dt, dtheta, dvel, c, dv_n, body):
     uy = (dvel[1] - x[14] * dt) / (1 + x[20])
     uz = (dvel[2] - x[15] * dt) / (1 + x[21])
     body[0], body[1], body[2], body[3], body[4], body[5] = tx, ty, tz, ux, uy, uz
-    # rotation of the body during the step
-    bx = ux + 0.5 * (ty * uz - tz * uy)
-    by = uy + 0.5 * (tz * ux - tx * uz)
-    bz = uz + 0.5 * (tx * uy - ty * ux)
+    # rotation of the body during the step, to second order: u + t x u / 2 + t x (t x u) / 6
+    sx, sy, sz = ty * uz - tz * uy, tz * ux - tx * uz, tx * uy - ty * ux
+    bx = ux + 0.5 * sx + (ty * sz - tz * sy) / 6
+    by = uy + 0.5 * sy + (tz * sx - tx * sz) / 6
+    bz = uz + 0.5 * sz + (tx * sy - ty * sx) / 6
     fx = c[0, 0] * bx + c[0, 1] * by + c[0, 2] * bz
     fy = c[1, 0] * bx + c[1, 1] * by + c[1, 2] * bz
     fz = c[2, 0] * bx + c[2, 1] * by + c[2, 2] * bz
