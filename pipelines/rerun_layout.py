@@ -24,7 +24,7 @@ def _arrange(stack: Stack, whole: rr.TimeRange) -> rrb.Vertical:
         rrb.TimeSeriesView(
             name=f"{label} [{stack.unit}]",
             origin=f"{stack.origin}/{label}",
-            axis_x=rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal, view_range=whole),
+            axis_x=rrb.TimeAxis(view_range=whole),
             plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop),
         )
         for label in stack.labels
@@ -33,8 +33,8 @@ def _arrange(stack: Stack, whole: rr.TimeRange) -> rrb.Vertical:
 
 
 def build_layout(stacks: tuple[Stack, ...], duration_s: float, eye: Point, target: Point, zoom: float) -> rrb.Blueprint:
-    """duration_s: of the drive, all of which the plots show. eye, target [m]: where the 3-D view looks from and at, east, north,
-    up. zoom: of the map, in web Mercator levels."""
+    """duration_s: of the drive, all of which the plots show. eye, target [m]: where the 3-D view looks from and at, as east,
+    north, up. zoom: of the map, in web Mercator levels."""
     margin = 0.02 * duration_s
     whole = rr.TimeRange(
         start=rr.TimeRangeBoundary.absolute(seconds=-margin), end=rr.TimeRangeBoundary.absolute(seconds=duration_s + margin)
