@@ -128,7 +128,7 @@ def _read_times(
 
 def _build_columns(selection: Selection, mapping: CsvMapping, timed: np.ndarray, place: str) -> dict[str, np.ndarray]:
     columns = {name: values[timed] for name, values in selection.columns.items()}
-    out = {
+    out: dict[str, np.ndarray] = {
         key: np.column_stack([columns[name] for name in names]).astype(np.float64)
         for key, names in _GROUPS.items()
         if columns.keys() >= set(names)

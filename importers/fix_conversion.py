@@ -67,7 +67,7 @@ def convert_fixes(
     become rows of their own. Raises LogError where no row is usable."""
     uses: list[ChannelUse] = []
     notes: list[str] = []
-    parts = []
+    parts: list[GnssFixSeries] = []
     for joined in (position, velocity):
         if joined is None:
             continue

@@ -17,7 +17,7 @@ from importers.settings import InputSettings
 from importers.sources import Clock, Source, join_sources
 from navreplay.timeline import ChannelUse, LogError, Provenance, SourceFile, Timeline
 
-__all__ = ["build_timeline", "hash_file", "load_timeline", "open_logs"]
+__all__ = ["build_timeline", "describe_file", "load_timeline", "open_logs"]
 
 Progress = Callable[[float], None]
 _BLOCK = 1 << 20
@@ -86,7 +86,7 @@ def build_timeline(
     elif settings.reference.from_fixes and fixes is not None:
         trajectory = reference_from_fixes(fixes, settings.reference)
         notes.append("the fixes themselves, before any is withheld, serve as the reference: not an independent one")
-    files = tuple(SourceFile(log.path, log.format, *hash_file(log.path)) for log in logs)
+    files = tuple(describe_file(log) for log in {log.path: log for log in logs}.values())
     provenance = Provenance(files, _complete(logs, uses), tuple(dict.fromkeys(notes)))
     levers = (np.array(settings.fix.lever_arm_m), _reference_lever(settings))
     return Timeline(imu, fixes, attitude, trajectory, *levers, provenance)
@@ -95,16 +95,17 @@ def build_timeline(
 _GNSS = ("fix", "velocity")
 
 
-def hash_file(path: str) -> tuple[int, str]:
-    """Size [bytes] and SHA-256 of a file, or of the files of a folder in the order of their names."""
-    files = sorted(part for part in Path(path).rglob("*") if part.is_file()) if Path(path).is_dir() else [Path(path)]
+def describe_file(log: Log) -> SourceFile:
+    """Size and SHA-256 of a log; of a folder, over its files in the order of their names."""
+    root = Path(log.path)
+    files = sorted(part for part in root.rglob("*") if part.is_file()) if root.is_dir() else [root]
     digest, size = sha256(), 0
     for part in files:
         with part.open("rb") as file:
             while block := file.read(_BLOCK):
                 digest.update(block)
                 size += len(block)
-    return size, digest.hexdigest()
+    return SourceFile(log.path, log.format, size, digest.hexdigest())
 
 
 def _read_tables(logs: Sequence[Log], choices: Sequence[Choice], progress: Progress | None) -> dict[tuple[int, str], Table]:

@@ -75,7 +75,7 @@ def _gps_fix(columns: Mapping[str, np.ndarray]) -> Rows:
 
 def _geodetic(columns: Mapping[str, np.ndarray]) -> Floats:
     lla = np.column_stack([columns["latitude"], columns["longitude"], columns["altitude"]]).astype(np.float64)
-    return lla * [np.pi / 180, np.pi / 180, 1.0]
+    return np.asarray(lla * [np.pi / 180, np.pi / 180, 1.0])
 
 
 def _position_covariance(columns: Mapping[str, np.ndarray]) -> Floats:

@@ -31,7 +31,8 @@ def _check_offset(match: YawMatch) -> Finding:
     figure = f"{match.offset_s:+.2f} s (noise {match.std_s:.2f} s, correlation {abs(match.correlation):.2f})"
     if step is not None:
         text = f"IMU and GNSS are {figure} apart in time: one of them is stamped in another of {_STEPS_S[step]}."
-        return Finding("error", "leap-seconds", text, "Set input.imu.time_base or input.fix.time_base.")
+        hint = f"Set input.imu.time_base or input.fix.time_base, or else input.imu.time_offset_s = {match.offset_s:.2f}."
+        return Finding("error", "leap-seconds", text, hint)
     if abs(match.offset_s) > max(_TOLD_S, 3 * match.std_s):
         text = f"Turns show in the IMU at another time than in the GNSS course: add {figure} to the IMU's stamps."
         hint = (

@@ -57,8 +57,8 @@ def read_nmea(path: str, utc_date: date | None, leap: LeapSeconds) -> Table:
     day = _date_rows(path, gga.index.to_numpy(), seconds, rmc, utc_date)
     t_ns = gps_from_utc(day * _DAY_S * 10**9 + np.rint(seconds * 1e6).astype(np.int64) * 1000, leap)
     vel, cov_vel = _match_velocities(gga, seconds, rmc)
-    columns = {"t_gps_ns": t_ns, "lla": _positions(gga), "vel_n": vel, "cov_vel": cov_vel}
-    columns["status"] = status_codes(gga[6].to_numpy(), _STATUS)
+    status = status_codes(gga[6].to_numpy(), _STATUS)
+    columns = {"t_gps_ns": t_ns, "lla": _positions(gga), "vel_n": vel, "cov_vel": cov_vel, "status": status}
     return Table(t_ns, columns, len(starts), _count_rejected(kind, intact, len(gga)))
 
 

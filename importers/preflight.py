@@ -16,6 +16,7 @@ _GAP_FACTOR = 3.0
 _LONG_GAP_S = 0.5
 _JUMP_S = 3600.0
 _GEOID_BIAS_M = 8.0
+_HORIZONTAL = (("forward", "back"), ("right", "left"))
 
 
 def preflight(timeline: Timeline) -> tuple[Finding, ...]:
@@ -79,15 +80,12 @@ def _check_direction(up: np.ndarray) -> list[Finding]:
         return [Finding("error", "upside-down", text, "Set input.imu.axes = 'flu' (or 'frd' where 'flu' was assumed).")]
     for axis in (0, 1):
         if abs(up[axis]) > 0.7:
-            sign, opposite = ("+", "u") if up[axis] > 0 else ("-", "d")
+            taken = _HORIZONTAL[axis][int(up[axis] < 0)]
             text = (
-                f"Gravity lies on a horizontal axis: the specific force points along {sign}{'xy'[axis]} of the body, so the "
-                "IMU is mounted on its side."
+                f"Gravity lies on a horizontal axis: what is taken for {taken} is up by the specific force, so the IMU is "
+                "mounted on its side."
             )
-            hint = (
-                f"Set input.imu.axes to where the sensor's x, y, z point in the vehicle; the letter of the axis that carries "
-                f"gravity is '{opposite}' where it reads positive there."
-            )
+            hint = f"Set input.imu.axes: the sensor axis taken for '{taken[0]}' is 'u'; look at the mounting for the other two."
             return [Finding("error", "gravity-horizontal", text, hint)]
     tilt = float(np.degrees(np.arccos(np.clip(-up[2], -1, 1))))
     if tilt > 15:

@@ -111,4 +111,4 @@ def _reject_jumps(screening: Screening, order: np.ndarray, t_ns: Times, lla: Flo
     bad[order[fast]] = True
     bad[order[fast + 1]] = True
     screening.reject(bad, "beside a speed jump")
-    return order[~bad[order]]
+    return np.asarray(order[~bad[order]])

@@ -86,7 +86,7 @@ def _read_times(selection: Selection, scale: str, dated: bool, leap: LeapSeconds
 def _build_columns(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     geodetic = _GEODETIC[0] in columns
     position = _stack(columns, _GEODETIC if geodetic else _EARTH_FIXED)
-    out = {"lla": position * [np.pi / 180, np.pi / 180, 1.0] if geodetic else lla_from_ecef(position)}
+    out: dict[str, np.ndarray] = {"lla": position * [np.pi / 180, np.pi / 180, 1.0] if geodetic else lla_from_ecef(position)}
     axes = "neu" if geodetic else "xyz"
     vel = tuple(f"v{axis}(m/s)" for axis in axes)
     if columns.keys() >= set(vel):

@@ -26,9 +26,9 @@ class Screening:
     @property
     def kept(self) -> NDArray[np.bool_]:
         """(n,) rows without a reason against them."""
-        return self._code == 0
+        return np.asarray(self._code == 0)
 
-    def reject(self, bad: NDArray[np.bool_], reason: str) -> None:
+    def reject(self, bad: np.ndarray, reason: str) -> None:
         """Rejects the rows of bad (n,) that are still kept."""
         if reason not in self._reasons:
             self._reasons.append(reason)

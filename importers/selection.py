@@ -9,7 +9,7 @@ from importers.messages import find_kind
 from importers.settings import InputSettings
 from navreplay.timeline import LogError
 
-__all__ = ["NOTHING", "SETTING", "Choice", "candidates", "choose_channels"]
+__all__ = ["NOTHING", "SETTING", "Choice", "candidates", "choose_channels", "choose_role"]
 
 SETTING = {
     "imu": "input.imu.channel",
@@ -46,29 +46,25 @@ def candidates(logs: Sequence[Log], role: str) -> list[Choice]:
 
 def choose_channels(logs: Sequence[Log], settings: InputSettings, reference: Log | None) -> tuple[Choice, ...]:
     """The channels of every role. Raises LogError where a named channel is missing or a choice is ambiguous."""
-    named = {
+    chosen = [choice for role in SETTING for choice in choose_role(logs, settings, reference, role)]
+    return (*chosen, *candidates(logs, "time"))
+
+
+def choose_role(logs: Sequence[Log], settings: InputSettings, reference: Log | None, role: str) -> list[Choice]:
+    """The channels of one role: one, or its continuations from file to file, or none. Raises LogError as `choose_channels`."""
+    if role == "reference":
+        return [] if settings.reference.from_fixes else _choose_reference(logs, settings.reference.channel, reference)
+    name = {
         "imu": settings.imu.channel,
         "fix": settings.fix.channel,
         "velocity": settings.fix.velocity_channel,
         "attitude": settings.attitude.channel,
-    }
-    chosen: list[Choice] = []
-    for role, name in named.items():
-        chosen += _choose(logs, role, name)
-    if not settings.reference.from_fixes:
-        taken = {(id(choice.log), choice.channel.name) for choice in chosen}
-        chosen += _choose_reference(logs, settings.reference.channel, reference, taken)
-    chosen += candidates(logs, "time")
-    return tuple(chosen)
-
-
-def _choose(logs: Sequence[Log], role: str, name: str | None) -> list[Choice]:
+    }[role]
     if name == NOTHING:
         return []
     if name is not None:
         return _named(logs, role, name)
-    found = [choice for choice in candidates(logs, role) if _automatic(choice.channel, role)]
-    return _only_one(found, role)
+    return _only_one([choice for choice in candidates(logs, role) if _automatic(choice.channel, role)], role)
 
 
 def _automatic(channel: Channel, role: str) -> bool:
@@ -76,21 +72,18 @@ def _automatic(channel: Channel, role: str) -> bool:
     return kind is not None and kind.automatic and kind.roles[0] == role
 
 
-def _choose_reference(
-    logs: Sequence[Log], name: str | None, reference: Log | None, taken: set[tuple[int, str]]
-) -> list[Choice]:
+def _choose_reference(logs: Sequence[Log], name: str | None, reference: Log | None) -> list[Choice]:
     """From the reference file whatever can serve; from the logs only what is meant as a reference."""
     searched = logs if reference is None else [reference]
     if name is not None:
         return _named(searched, "reference", name)
     found = candidates(searched, "reference")
+    meant = [choice for choice in found if _automatic(choice.channel, "reference")]
     if reference is None:
-        found = [choice for choice in found if _automatic(choice.channel, "reference")]
-        return _only_one([choice for choice in found if (id(choice.log), choice.channel.name) not in taken], "reference")
+        return _only_one(meant, "reference")
     if not found:
         types = ", ".join(f"{channel.name} ({channel.type})" for channel in reference.channels()) or "nothing"
         raise LogError(f"{reference.path}: no channel can serve as a reference; it holds {types}")
-    meant = [choice for choice in found if _automatic(choice.channel, "reference")]
     absolute = [choice for choice in found if _automatic(choice.channel, "fix")]
     return _only_one(meant or absolute or found, "reference")
 

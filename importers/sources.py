@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -103,7 +104,7 @@ def _extract(source: Source) -> Rows:
 def _concatenate(rows: Sequence[Rows]) -> Rows:
     if len(rows) == 1:
         return rows[0]
-    arrays = {}
+    arrays: dict[str, Any] = {}
     for field in fields(Rows):
         values = [getattr(part, field.name) for part in rows]
         if all(isinstance(value, np.ndarray) for value in values):

@@ -1,0 +1,187 @@
+"""What logs hold: channels with their rates, gaps and time bases, what each would be used as, and the findings about them."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from importers.clock import leap_seconds
+from importers.findings import Finding
+from importers.formats import open_log
+from importers.load import build_timeline, describe_file, open_logs
+from importers.log import Channel, Log, Table
+from importers.messages import find_kind, stamp_column
+from importers.preflight import preflight
+from importers.selection import SETTING, Choice, candidates, choose_role
+from importers.settings import InputSettings
+from importers.sources import Clock, Source, join_sources
+from navreplay.time_scales import LeapSeconds, gps_from_utc
+from navreplay.timeline import LogError, SourceFile, Times
+
+__all__ = ["ChannelInfo", "Inspection", "inspect_logs"]
+
+_GAP_FACTOR = 3.0
+_EPOCH_1990_UNIX_NS = 631_152_000 * 10**9
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelInfo:
+    """One channel of a file. count: messages. first_ns, last_ns: GPS time of the earliest and latest stamp, None where it
+    was not read. rate_hz: by the median interval. gaps: intervals of more than three times the median; largest_gap_s:
+    longest interval. time_base: as its stamps look. possible: roles that its type can serve in. role: what it would be used
+    as, ``unused`` if nothing."""
+
+    name: str
+    file: str
+    type: str
+    encoding: str
+    count: int | None
+    first_ns: int | None
+    last_ns: int | None
+    rate_hz: float | None
+    gaps: int
+    largest_gap_s: float | None
+    time_base: str
+    possible: tuple[str, ...]
+    role: str
+
+
+@dataclass(frozen=True, slots=True)
+class Inspection:
+    """What some logs hold. candidates: by role, the channels among which a setting has to choose, where that is open.
+    assumptions: sentences on what was assumed or converted."""
+
+    files: tuple[SourceFile, ...]
+    channels: tuple[ChannelInfo, ...]
+    findings: tuple[Finding, ...]
+    candidates: Mapping[str, tuple[str, ...]]
+    assumptions: tuple[str, ...]
+
+
+def inspect_logs(
+    paths: Sequence[str | Path], settings: InputSettings | None = None, reference: str | Path | None = None
+) -> Inspection:
+    """Reads logs and tells what they hold. Raises LogError where a file cannot be opened; all else becomes a finding."""
+    settings = settings or InputSettings()
+    logs = open_logs(paths, settings)
+    reference = settings.reference.file if reference is None else reference
+    reference_log = None if reference is None else open_log(reference, settings)
+    everything = [*logs, *([] if reference_log is None else [reference_log])]
+    findings: list[Finding] = []
+    chosen, open_choices = _choose(logs, settings, reference_log, findings)
+    tables = _read(everything, findings)
+    roles = {(id(choice.log), choice.channel.name): choice.role for choice in chosen}
+    channels = tuple(
+        _describe(log, channel, tables.get((id(log), channel.name)), roles.get((id(log), channel.name)), settings, findings)
+        for log in everything
+        for channel in log.channels()
+    )
+    usable = [choice for choice in chosen if (id(choice.log), choice.channel.name) in tables]
+    assumptions: tuple[str, ...] = ()
+    try:
+        timeline = build_timeline(everything, usable, tables, settings)
+    except LogError as error:
+        findings.append(Finding("error", "unusable", f"{error}.", ""))
+    else:
+        assumptions = timeline.provenance.assumptions
+        findings += [finding for finding in preflight(timeline) if finding.code not in _implied(open_choices)]
+    files = tuple(describe_file(log) for log in everything)
+    return Inspection(files, channels, tuple(findings), open_choices, assumptions)
+
+
+def _implied(open_choices: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
+    """Findings that an open choice has told already."""
+    return tuple(code for role, code in (("imu", "no-imu"), ("fix", "no-gnss")) if role in open_choices)
+
+
+def _choose(
+    logs: Sequence[Log], settings: InputSettings, reference: Log | None, findings: list[Finding]
+) -> tuple[list[Choice], dict[str, tuple[str, ...]]]:
+    chosen: list[Choice] = [*candidates(logs, "time")]
+    open_choices: dict[str, tuple[str, ...]] = {}
+    for role in SETTING:
+        try:
+            chosen += choose_role(logs, settings, reference, role)
+        except LogError as error:
+            searched = logs if role != "reference" or reference is None else [reference]
+            open_choices[role] = tuple(dict.fromkeys(choice.channel.name for choice in candidates(searched, role)))
+            findings.append(Finding("error", "channel-choice", f"{error}.", f"--set {SETTING[role]}=CHANNEL"))
+    return chosen, open_choices
+
+
+def _read(logs: Sequence[Log], findings: list[Finding]) -> dict[tuple[int, str], Table]:
+    """All channels that mean something to navigation."""
+    tables: dict[tuple[int, str], Table] = {}
+    for log in logs:
+        names = tuple(dict.fromkeys(channel.name for channel in log.channels() if find_kind(channel.type) is not None))
+        try:
+            tables |= {(id(log), name): table for name, table in (log.read(names) if names else {}).items()}
+        except LogError as error:
+            findings.append(Finding("error", "unreadable", f"{error}.", ""))
+    return tables
+
+
+def _describe(
+    log: Log, channel: Channel, table: Table | None, role: str | None, settings: InputSettings, findings: list[Finding]
+) -> ChannelInfo:
+    """One channel; a table that cannot be timed becomes a finding."""
+    t_ns = np.empty(0, dtype=np.int64)
+    base = ""
+    if table is not None:
+        base = _guess_base(table, leap_seconds(settings.leap_seconds))
+        t_ns = np.sort(_times(log, channel, table, role, settings))
+        if (
+            base in ("gps time", "tai")
+            and "t_gps_ns" not in table.columns
+            and role in ("imu", "fix")
+            and getattr(settings, role).time_base == "auto"
+        ):
+            word = "gps" if base == "gps time" else "tai"
+            text = f"The stamps of {channel.name} are as far ahead of the recorder's clock as {base} is ahead of UTC."
+            hint = f"Set input.{role}.time_base = '{word}' if that is what they are."
+            findings.append(Finding("warning", "time-base", text, hint))
+    interval = np.diff(t_ns) / 1e9
+    nominal = float(np.median(interval)) if len(interval) else None
+    return ChannelInfo(
+        channel.name,
+        log.path,
+        channel.type,
+        channel.encoding,
+        table.read if table is not None else channel.count,
+        int(t_ns[0]) if len(t_ns) else None,
+        int(t_ns[-1]) if len(t_ns) else None,
+        1 / nominal if nominal else None,
+        int((interval > _GAP_FACTOR * nominal).sum()) if nominal else 0,
+        float(interval.max()) if len(interval) else None,
+        base,
+        kind.roles if (kind := find_kind(channel.type)) is not None else (),
+        role or "unused",
+    )
+
+
+def _times(log: Log, channel: Channel, table: Table, role: str | None, settings: InputSettings) -> Times:
+    options = {"imu": settings.imu, "attitude": settings.attitude, "reference": settings.reference}.get(
+        role or "", settings.fix
+    )
+    if role == "time" or len(table.log_time_ns) == 0:
+        return gps_from_utc(table.log_time_ns, leap_seconds(settings.leap_seconds))
+    source = Source(log.path, channel, table, role or "unused")
+    return join_sources([source], options, Clock(leap_seconds(settings.leap_seconds))).t_ns
+
+
+def _guess_base(table: Table, leap: LeapSeconds) -> str:
+    """What the stamps look like, beside the clock of the recorder."""
+    if "t_gps_ns" in table.columns:
+        return "gps time"
+    stamps = stamp_column(table)
+    if stamps is None or len(stamps) == 0:
+        return "recorder's clock"
+    if np.median(stamps) < _EPOCH_1990_UNIX_NS:
+        return "boot"
+    ahead = float(np.median(stamps.astype(np.int64) - table.log_time_ns)) / 1e9
+    utc = np.array([np.median(stamps)], dtype=np.int64)
+    leaps = float(gps_from_utc(utc, leap)[0] - utc[0]) / 1e9 + 315_964_800
+    if abs(ahead - leaps) < 1:
+        return "gps time"
+    return "tai" if abs(ahead - leaps - 19) < 1 else "utc"
