@@ -12,6 +12,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -87,6 +88,11 @@ def write_ros2(path: Path, count: int) -> None:
             bag.write(connection, t_ns, raw)
 
 
+def read_imu(reader: Callable[[str], Log], path: Path) -> None:
+    """Open a log and read its channel."""
+    reader(str(path)).read(("/imu",))
+
+
 def decode_with_mcap_ros2(path: Path) -> None:
     """Decode all messages with mcap-ros2-support."""
     with path.open("rb") as file:
@@ -101,21 +107,18 @@ def decode_with_any_reader(path: Path) -> None:
             reader.deserialize(raw, connection.msgtype)
 
 
-def microseconds(run: Callable[[], None], count: int, repetitions: int) -> float:
-    """Median CPU time per message [us]."""
-    times = []
-    for _ in range(repetitions):
-        begin = time.process_time()
-        run()
-        times.append((time.process_time() - begin) / count * 1e6)
-    return statistics.median(times)
+def cpu_seconds(run: Callable[[], object]) -> float:
+    """CPU time of one run."""
+    begin = time.process_time()
+    run()
+    return time.process_time() - begin
 
 
 def peak_megabytes(path: Path) -> float:
-    """Peak resident memory [MB] of a process that reads the MCAP."""
+    """Peak resident memory [MB] of a process that reads the MCAP, as Linux counts it."""
     program = (
-        "import resource, sys; from importers.mcap_log import McapLog; log = McapLog(sys.argv[1]); log.read(('/imu',));"
-        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)"
+        "import re, sys; from importers.mcap_log import McapLog; log = McapLog(sys.argv[1]); log.read(('/imu',));"
+        "print(int(re.search(r'VmHWM:\\s+(\\d+)', open('/proc/self/status').read())[1]) / 1024)"
     )
     return float(subprocess.run([sys.executable, "-c", program, str(path)], capture_output=True, check=True, text=True).stdout)
 
@@ -139,9 +142,12 @@ def main() -> None:
             short = Path(scratch) / f"short_{name}"
             write(path, count)
             write(short, few)
-            reader(str(path)).read(("/imu",))  # the first run compiles or loads the kernels
-            ours = microseconds(lambda path=path, reader=reader: reader(str(path)).read(("/imu",)), count, options.repetitions)
-            theirs = microseconds(lambda path=short, decode=decode: decode(path), few, options.repetitions)
+            read_imu(reader, path)  # the first run compiles or loads the kernels
+            times = [
+                (cpu_seconds(partial(read_imu, reader, path)) / count, cpu_seconds(partial(decode, short)) / few)
+                for _ in range(options.repetitions)
+            ]
+            ours, theirs = (statistics.median(column) * 1e6 for column in zip(*times, strict=True))
             print(f"{name:9} {count} messages: {ours:.2f} us each; {library} {theirs:.1f} us; {theirs / ours:.0f} times faster")
         print(f"imu.mcap  peak memory of a process reading it: {peak_megabytes(Path(scratch) / 'imu.mcap'):.0f} MB")
 

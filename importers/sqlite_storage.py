@@ -1,8 +1,9 @@
 """Reader of one sqlite3 storage file (.db3) of a ROS 2 bag."""
 
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from navreplay.timeline import LogError
 __all__ = ["SqliteStorage"]
 
 _MAGIC = b"SQLite format 3\0"
-_BLOCK_MESSAGES = 1 << 13
+_BLOCK_MESSAGES = 1 << 12
 _LANGUAGES = {"ros2msg": "msg", "ros2idl": "idl"}
 
 
@@ -93,23 +94,28 @@ class SqliteStorage:
         marks = ",".join("?" * len(wanted))
         query = f"SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({marks}) ORDER BY id"
         with closing(self._connect()) as database:
-            rows: list[tuple[int, int, bytes]] = []
-            try:
-                for row in database.execute(query, tuple(wanted)):
-                    if isinstance(row[1], int) and isinstance(row[2], bytes):
-                        rows.append(row)
-                    if len(rows) == _BLOCK_MESSAGES:
-                        yield _block(rows)
-                        rows = []
-            except sqlite3.DatabaseError as error:
-                self._note(f"reading stopped at damage in the file ({error}); messages before it were kept")
-            if rows:
-                yield _block(rows)
+            cursor = database.execute(query, tuple(wanted))
+            block = _block_of(cursor, self._note)
+            while block:
+                yield block
+                block = _block_of(cursor, self._note)
 
 
-def _block(rows: list[tuple[int, int, bytes]]) -> Block:
-    topics, times, messages = zip(*rows, strict=True)
-    length = np.array([len(message) for message in messages], dtype=np.int64)
-    stop = np.cumsum(length)
-    buffer = np.frombuffer(b"".join(messages), dtype=np.uint8)
-    return Block(buffer, np.array(topics, dtype=np.int64), np.array(times, dtype=np.int64), stop - length, stop)
+def _block_of(cursor: sqlite3.Cursor, note: Callable[[str], None]) -> Block | None:
+    """The next few thousand rows (topic, time, message); None at the end, and behind damage."""
+    topics, times, stops, buffer = [], [], [0], bytearray()
+    try:
+        for topic, time, message in islice(cursor, _BLOCK_MESSAGES):
+            # A damaged row may hold anything; that it is lost shows in the balance with the count.
+            if isinstance(time, int) and isinstance(message, bytes):
+                buffer += message
+                topics.append(topic)
+                times.append(time)
+                stops.append(len(buffer))
+    except sqlite3.DatabaseError as error:
+        note(f"reading stopped at damage in the file ({error}); messages before it were kept")
+    if not times:
+        return None
+    limits = np.array(stops, dtype=np.int64)
+    content = np.frombuffer(bytes(buffer), dtype=np.uint8)
+    return Block(content, np.array(topics, dtype=np.int64), np.array(times, dtype=np.int64), limits[:-1], limits[1:])
