@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from importlib import import_module, metadata
 from pathlib import Path
 
-__all__ = ["main"]
+__all__ = ["EXPORT_FORMATS", "main"]
 
-EXPORT_FORMATS = ("tum", "kitti", "csv", "parquet", "kml", "geojson", "pos")
+# As pipelines.export has them; not imported from there, so that --help stays quick.
+EXPORT_FORMATS = ("csv", "parquet", "tum", "kitti", "kml", "geojson", "pos", "sbet")
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -5,6 +5,7 @@ from math import isfinite
 from pathlib import Path
 
 from navreplay.metrics import Evaluation, summarise_outages
+from navreplay.timeline import Provenance
 from pipelines.result import RunResult
 
 __all__ = ["describe_outputs", "headline_figures", "summarise_run"]
@@ -56,9 +57,21 @@ def summarise_run(result: RunResult) -> list[str]:
     lines += [
         f"{finding.level}: {finding.text} {finding.hint}".rstrip() for finding in result.findings if finding.level != "info"
     ]
+    lines += _describe_losses(result.timeline.provenance)
     if result.evaluation is None:
         return [*lines, "no reference, so no errors; give one with --reference"]
     return lines + _describe_errors(result.evaluation)
+
+
+def _describe_losses(provenance: Provenance) -> list[str]:
+    """Damage found in files (notes that begin with a file's path) and messages that were rejected."""
+    paths = tuple(f"{file.path}: " for file in provenance.files)
+    damage = [f"damaged: {note}" for note in provenance.assumptions if note.startswith(paths)]
+    return damage + [
+        f"rejected: {channel.name}: {count} of {channel.read} messages ({reason})"
+        for channel in provenance.channels
+        for reason, count in channel.rejected.items()
+    ]
 
 
 def _describe_errors(evaluation: Evaluation) -> list[str]:
