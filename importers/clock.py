@@ -25,7 +25,8 @@ def count_ns(count: np.ndarray, unit: str) -> Times:
         return count.astype(np.int64) * scale
     whole = np.floor(count)
     steps = min(scale, 10**6)
-    return whole.astype(np.int64) * scale + np.rint((count - whole) * steps).astype(np.int64) * (scale // steps)
+    fraction = np.rint((count - whole) * steps).astype(np.int64) * (scale // steps)
+    return np.asarray(whole.astype(np.int64) * scale + fraction)
 
 
 def unwrap_weeks(gps_week: int | None, tow_s: np.ndarray, place: str) -> np.ndarray:

@@ -14,7 +14,7 @@ from importers.log import Channel, Log, Table
 from importers.messages import find_kind, stamp_column
 from importers.preflight import preflight
 from importers.selection import SETTING, Choice, candidates, choose_role
-from importers.settings import InputSettings
+from importers.settings import AttitudeInput, FixInput, ImuInput, InputSettings, ReferenceInput
 from importers.sources import Clock, Source, join_sources
 from navreplay.time_scales import LeapSeconds, gps_from_utc
 from navreplay.timeline import LogError, SourceFile, Times
@@ -161,13 +161,12 @@ def _describe(
 
 
 def _times(log: Log, channel: Channel, table: Table, role: str | None, settings: InputSettings) -> Times:
-    options = {"imu": settings.imu, "attitude": settings.attitude, "reference": settings.reference}.get(
-        role or "", settings.fix
-    )
+    by_role: dict[str, ImuInput | FixInput | AttitudeInput | ReferenceInput]
+    by_role = {"imu": settings.imu, "attitude": settings.attitude, "reference": settings.reference}
     if role == "time" or len(table.log_time_ns) == 0:
         return gps_from_utc(table.log_time_ns, leap_seconds(settings.leap_seconds))
     source = Source(log.path, channel, table, role or "unused")
-    return join_sources([source], options, Clock(leap_seconds(settings.leap_seconds))).t_ns
+    return join_sources([source], by_role.get(role or "", settings.fix), Clock(leap_seconds(settings.leap_seconds))).t_ns
 
 
 def _guess_base(table: Table, leap: LeapSeconds) -> str:

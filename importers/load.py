@@ -65,7 +65,7 @@ def build_timeline(
         sources.setdefault(choice.role, []).append(Source(choice.log.path, choice.channel, table, choice.role))
     clock = Clock(leap_seconds(settings.leap_seconds), tuple(source.table for source in sources.get("time", [])))
     uses: list[ChannelUse] = [_time_use(source) for source in sources.get("time", [])]
-    notes: list[str] = [note for log in logs for note in log.notes]
+    notes: list[str] = [f"{log.path}: {note}" for log in logs for note in log.notes]
     imu = fixes = attitude = trajectory = None
     if "imu" in sources:
         imu, told, assumed = convert_imu(join_sources(sources["imu"], settings.imu, clock), settings.imu)

@@ -99,7 +99,7 @@ def _grid_integral(imu: ImuSeries, signal: Floats) -> Floats:
     seconds = (imu.t_ns - imu.t_ns[0]) / 1e9
     steps = np.diff(seconds) * (signal[1:] if imu.increments else (signal[1:] + signal[:-1]) / 2)
     total = np.concatenate([[0.0], np.cumsum(steps)])
-    return np.interp(np.arange(0.0, seconds[-1] + _GRID_S, _GRID_S), seconds, total)
+    return np.asarray(np.interp(np.arange(0.0, seconds[-1] + _GRID_S, _GRID_S), seconds, total))
 
 
 def _gnss_motion(imu: ImuSeries, fixes: GnssFixSeries) -> _Motion:
@@ -163,4 +163,4 @@ def _fit(felt: Floats, rate: Floats) -> tuple[float, float]:
     if power == 0 or not rate.any():
         return 0.0, 0.0
     product = float(felt @ rate)
-    return product / np.sqrt(power * float(rate @ rate)), product / power
+    return product / float(np.sqrt(power * float(rate @ rate))), product / power

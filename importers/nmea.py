@@ -58,7 +58,13 @@ def read_nmea(path: str, utc_date: date | None, leap: LeapSeconds) -> Table:
     t_ns = gps_from_utc(day * _DAY_S * 10**9 + np.rint(seconds * 1e6).astype(np.int64) * 1000, leap)
     vel, cov_vel = _match_velocities(gga, seconds, rmc)
     status = status_codes(gga[6].to_numpy(), _STATUS)
-    columns = {"t_gps_ns": t_ns, "lla": _positions(gga), "vel_n": vel, "cov_vel": cov_vel, "status": status}
+    columns: dict[str, np.ndarray] = {
+        "t_gps_ns": t_ns,
+        "lla": _positions(gga),
+        "vel_n": vel,
+        "cov_vel": cov_vel,
+        "status": status,
+    }
     return Table(t_ns, columns, len(starts), _count_rejected(kind, intact, len(gga)))
 
 

@@ -18,6 +18,8 @@ from navreplay.timeline import LogError
 __all__ = ["Selection", "TextTable", "parse_text", "read_bytes", "select_columns"]
 
 _NEWLINE = 10
+# From pandas 3.1 on, numbers are always rounded correctly and the option is deprecated.
+_EXACT_FLOATS = {} if tuple(map(int, pd.__version__.split(".")[:2])) >= (3, 1) else {"float_precision": "round_trip"}
 _HEAD_LINES = 50
 
 
@@ -169,7 +171,7 @@ def _parse_lines(lines: bytes, delimiter: str, width: int) -> pd.DataFrame:
         engine="c",
         quoting=csv.QUOTE_NONE,
         skipinitialspace=True,
-        float_precision="round_trip",
         low_memory=False,
         encoding_errors="replace",
+        **_EXACT_FLOATS,
     )
