@@ -13,6 +13,7 @@ from pipelines.report_tables import headline_figures, report_tables
 from pipelines.result import RunResult
 from pipelines.solution_csv import utc_text, write_solution_csv
 from pipelines.spec import dump_toml
+from pipelines.whole_file import write_whole
 
 __all__ = ["label_methods", "write_comparison", "write_outputs"]
 
@@ -75,18 +76,8 @@ def _title(result: RunResult) -> tuple[str, str]:
 
 def _write_files(out_dir: Path, writers: dict[str, Callable[[Path], object]]) -> dict[str, Path]:
     try:
-        out_dir.mkdir(parents=True, exist_ok=True)
         for name, write in writers.items():
-            _write_whole(out_dir / name, write)
+            write_whole(out_dir / name, write)
     except OSError as error:
         raise LogError(f"{out_dir}: cannot write the results: {error.strerror or error}; choose another -o") from error
     return {name: out_dir / name for name in writers}
-
-
-def _write_whole(path: Path, write: Callable[[Path], object]) -> None:
-    part = path.with_name(f".{path.name}.part")
-    try:
-        write(part)
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""solution.csv: the trajectory as other programs read it (columns and digits in docs/outputs.md)."""
+"""solution.csv: the trajectory as other programs read it (columns and digits in docs/report.md)."""
 
 from dataclasses import dataclass
 from pathlib import Path
