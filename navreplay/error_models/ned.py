@@ -20,6 +20,7 @@ ATTITUDE = slice(6, 9)
 GYRO_BIAS = slice(9, 12)
 ACCEL_BIAS = slice(12, 15)
 
+_GRAVITY = 9.81
 _NAMES = (
     *("position_n", "position_e", "position_d", "velocity_n", "velocity_e", "velocity_d"),
     *("attitude_n", "attitude_e", "attitude_d", "gyro_bias_x", "gyro_bias_y", "gyro_bias_z"),
@@ -78,16 +79,28 @@ class NedErrorModel:
         """(n - 9,) correlation times of the sensor errors [s]."""
         return np.repeat([self.noise.gyro_bias_tau, self.noise.accel_bias_tau, np.inf, np.inf], 3)[: self.size - 9]
 
-    def initial_covariance(self, cov_pos: Floats, cov_vel: Floats, cov_att: Floats) -> Floats:
-        """(n, n) from covariances (3, 3) of position [m^2], velocity [m^2/s^2] and attitude [rad^2]; sensor errors as told."""
+    def initial_covariance(self, cov_pos: Floats, cov_vel: Floats, cov_att: Floats, gyro_bias_std: float) -> Floats:
+        """(n, n) from covariances (3, 3) of position [m^2], velocity [m^2/s^2] and attitude [rad^2] and the standard deviation
+        of the gyro bias [rad/s]; the other sensor errors as the noise description has them."""
         cov = np.zeros((self.size, self.size))
         cov[POSITION, POSITION] = cov_pos
         cov[VELOCITY, VELOCITY] = cov_vel
         cov[ATTITUDE, ATTITUDE] = cov_att
-        stds = [self.noise.gyro_bias_std, self.noise.accel_bias_std, self.noise.gyro_scale_std, self.noise.accel_scale_std]
+        stds = [gyro_bias_std, self.noise.accel_bias_std, self.noise.gyro_scale_std, self.noise.accel_scale_std]
         sensor = np.repeat(np.square(stds), 3)[: self.size - 9]
         cov[range(9, self.size), range(9, self.size)] = sensor
         return cov
+
+    def tie_tilt_to_accel_bias(self, cov: Floats, q_nb: Floats) -> Floats:
+        """cov (n, n) of a state levelled by its accelerometers at attitude q_nb (4,): their biases b tilt it by
+        phi = [(C b)_E, -(C b)_N, 0] / g, which is then no error that is independent of b."""
+        tilt = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]) / _GRAVITY @ rotation.matrix_from_quat(q_nb)
+        shared = tilt @ cov[ACCEL_BIAS, ACCEL_BIAS]
+        tied = cov.copy()
+        tied[ATTITUDE, ATTITUDE] += shared @ tilt.T
+        tied[ATTITUDE, ACCEL_BIAS] = shared
+        tied[ACCEL_BIAS, ATTITUDE] = shared.T
+        return tied
 
     def retract(self, state: NavState, correction: Floats) -> NavState:
         """The state moved by an estimated error (n,), true minus computed."""

@@ -7,11 +7,12 @@ import numpy as np
 
 from navreplay.alignment import Alignment, align
 from navreplay.earth import move_lla
-from navreplay.error_models.ned import GYRO_BIAS, NedErrorModel
+from navreplay.error_models.ned import NedErrorModel
 from navreplay.filters.core import Gaussian, condition
 from navreplay.filters.gate import Gate
 from navreplay.filters.presets import Method
 from navreplay.filters.record import Recorder
+from navreplay.heading import Sources
 from navreplay.measurements import (
     FixNoise,
     Measurement,
@@ -126,7 +127,7 @@ def _run_stretch(
     recorder: Recorder,
     progress: Progress | None,
 ) -> _Rows:
-    start = align(imu, fixes, timeline.attitude, timeline.reference, options.imu_noise, options.alignment)
+    start = align(Sources(imu, fixes, timeline.attitude, timeline.reference, options.imu_noise, options.alignment))
     recorder.tell(start.t_ns, "info", start.text)
     for warning in start.warnings:
         recorder.tell(start.t_ns, "warning", warning)
@@ -187,11 +188,12 @@ def _initial(
     lever_n = matrix_from_quat(start.q_nb) @ lever_b
     known = bool(fixes.has_velocity[at])
     velocity = fixes.vel_n[at] if known else start.vel_n
-    cov_vel = noise.velocity[at] if known else start.cov_vel
+    cov_vel = noise.velocity[at] if known else np.eye(3) * start.vel_std**2
     zero = np.zeros(3)
     state = NavState(move_lla(fixes.lla[at], -lever_n), velocity.copy(), start.q_nb, start.gyro_bias, zero, zero, zero)
-    cov = model.initial_covariance(noise.position[at], cov_vel, start.cov_att)
-    cov[GYRO_BIAS, GYRO_BIAS] = np.eye(3) * start.gyro_bias_std**2
+    cov = model.initial_covariance(noise.position[at], cov_vel, start.cov_att, start.gyro_bias_std)
+    if start.levelled:
+        cov = model.tie_tilt_to_accel_bias(cov, start.q_nb)
     return state, cov
 
 
