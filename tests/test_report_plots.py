@@ -1,0 +1,79 @@
+"""Scales, ticks and thinning of the plots."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipelines.report_figures import bend_of
+from pipelines.scales import Scale, nice_ticks, thin_band, thin_line, time_label, time_ticks
+from pipelines.svg import Layer, Panel, draw_map, draw_time_panels
+
+
+@given(st.floats(-1e6, 1e6), st.floats(1e-4, 1e6))
+def test_ticks_are_round_even_and_inside(low: float, width: float) -> None:
+    ticks = nice_ticks(low, low + width, 5)
+    assert 1 <= len(ticks) <= 7
+    assert low - 1e-6 * width <= ticks[0]
+    assert ticks[-1] <= low + width * (1 + 1e-6)
+    if len(ticks) > 2:
+        assert np.allclose(np.diff(ticks), ticks[1] - ticks[0], rtol=1e-3)
+
+
+def test_time_ticks_fall_on_round_times() -> None:
+    assert time_ticks(0, 548, 7) == [0, 120, 240, 360, 480]
+    assert time_ticks(0, 3600, 7) == [0, 600, 1200, 1800, 2400, 3000, 3600]
+    assert [time_label(t) for t in (0.0, 75.0, 3725.0, 0.5)] == ["0:00", "1:15", "1:02:05", "0.5 s"]
+
+
+def test_bent_scale_keeps_order_ends_and_sign() -> None:
+    scale = Scale(-20.0, 20.0, 100.0, linear_to=0.01)
+    placed = scale.place(np.array([-20.0, -0.1, 0.0, 0.1, 20.0]))
+    assert placed == pytest.approx([0, 100 - placed[3], 50, placed[3], 100])
+    assert (np.diff(placed) > 5).all()
+    assert scale.ticks(4) == [-10, -0.1, 0, 0.1, 10]
+
+
+def test_bent_scale_is_chosen_only_for_wide_ranges() -> None:
+    assert bend_of(np.linspace(-1, 1, 100)) is None
+    assert bend_of(np.r_[np.full(100, 0.03), 20.0, np.nan]) == 0.01
+    assert bend_of(np.zeros(5)) is None
+
+
+def test_thinning_keeps_ends_and_peaks() -> None:
+    x = np.linspace(0, 3600, 36001)
+    y = np.sin(x / 100)
+    y[[777, 20001]] = [50, -60]
+    thin_x, thin_y = thin_line(x, y)
+    assert len(thin_x) <= 1402
+    assert (np.diff(thin_x) > 0).all()
+    assert (thin_y.max(), thin_y.min(), thin_x[0], thin_x[-1]) == (50, -60, 0, 3600)
+    band_x, low, high = thin_band(x, -np.abs(y), np.abs(y))
+    assert len(band_x) <= 350
+    assert (high.max(), low.min(), band_x[0], band_x[-1]) == (60, -60, 0, 3600)
+
+
+def test_thinning_leaves_out_what_is_unknown() -> None:
+    x, y = thin_line(np.array([0.0, 1.0, 2.0]), np.array([1.0, np.nan, 3.0]))
+    assert (x.tolist(), y.tolist()) == ([0, 2], [1, 3])
+    assert (
+        draw_time_panels([Panel("p", (Layer("line", x, np.full(2, np.nan), "c1", "n"),))], 2.0).count('<path class="line') == 0
+    )
+
+
+def test_map_has_one_scale_on_both_axes_and_breaks_lines_at_gaps() -> None:
+    x = np.array([0.0, 100.0, 100.0, np.nan, 0.0, 50.0])
+    y = np.array([0.0, 0.0, 50.0, np.nan, 50.0, 50.0])
+    svg = draw_map([Layer("line", x, y, "c1", "track")])
+    path = svg.split('class="line c1" d="')[1].split('"')[0]
+    pieces = [np.array(piece.split(), dtype=float).reshape(-1, 2) for piece in path.split("M")[1:]]
+    assert [len(piece) for piece in pieces] == [3, 2]
+    across, up = pieces[0][1] - pieces[0][0], pieces[0][2] - pieces[0][1]
+    assert across[0] == pytest.approx(-2 * up[1], abs=0.2)
+
+
+def test_names_are_escaped_in_drawings() -> None:
+    layer = Layer("dots", np.array([0.0]), np.array([1.0]), "c1", '"><script>')
+    svg = draw_time_panels([Panel("<b>", (layer,))], 1.0)
+    assert "<script" not in svg
+    assert "<b>" not in svg
