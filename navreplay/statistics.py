@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from navreplay.solution import InnovationSeries
 from navreplay.timeline import Floats
@@ -59,7 +59,7 @@ def summarise(error: Floats) -> Statistics:
 def judge_squares(values: Floats, dof: int) -> Consistency:
     """Normalised squared errors (k,) of dof degrees of freedom against chi-square; NaN entries are left out."""
     known = values[np.isfinite(values)]
-    lower, upper = chi2.ppf([0.025, 0.975], dof)
+    lower, upper = chdtri(dof, [0.975, 0.025])
     if len(known) == 0:
         return Consistency(dof, 0, float("nan"), float(lower), float(upper), float("nan"), float("nan"))
     below = known <= upper

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from navreplay.filters.core import Innovation, chi_square
 from navreplay.filters.record import Judged
@@ -66,7 +66,7 @@ class Gate:
         return Verdict(passed, nis, reasons, inflation, run)
 
     def _limit(self, size: int) -> float:
-        return float(chi2.ppf(self._options.probability, size)) if self._options.probability < 1 else float("inf")
+        return float(chdtri(size, 1 - self._options.probability)) if self._options.probability < 1 else float("inf")
 
     @staticmethod
     def _square(innovation: Innovation, noise: Floats, rows: np.ndarray) -> float:
