@@ -1,6 +1,7 @@
 """Readers of navigation logs: any supported file becomes series on one timeline.
 
-The public names below are loaded when they are first used, so that importing the package costs nothing.
+The public names below are loaded when they are first used, so that importing the package costs nothing. The checks of a
+timeline are `importers.preflight.preflight`.
 """
 
 from importlib import import_module
@@ -11,7 +12,6 @@ if TYPE_CHECKING:
     from importers.formats import open_log
     from importers.inspection import Inspection, inspect_logs
     from importers.load import load_timeline
-    from importers.preflight import preflight
     from importers.settings import InputSettings
     from navreplay.timeline import LogError
 
@@ -23,7 +23,6 @@ __all__ = [
     "inspect_logs",
     "load_timeline",
     "open_log",
-    "preflight",
 ]
 
 _HOME = {
@@ -34,7 +33,6 @@ _HOME = {
     "inspect_logs": "importers.inspection",
     "load_timeline": "importers.load",
     "open_log": "importers.formats",
-    "preflight": "importers.preflight",
 }
 
 

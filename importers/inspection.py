@@ -77,6 +77,8 @@ def inspect_logs(
         for log in everything
         for channel in log.channels()
     )
+    damage = [note for log in everything for note in log.notes]
+    findings += [Finding("warning", "damaged", note, "") for note in damage]
     usable = [choice for choice in chosen if (id(choice.log), choice.channel.name) in tables]
     assumptions: tuple[str, ...] = ()
     try:
@@ -84,7 +86,7 @@ def inspect_logs(
     except LogError as error:
         findings.append(Finding("error", "unusable", f"{error}.", ""))
     else:
-        assumptions = timeline.provenance.assumptions
+        assumptions = tuple(note for note in timeline.provenance.assumptions if note not in damage)
         findings += [finding for finding in preflight(timeline) if finding.code not in _implied(open_choices)]
     files = tuple(describe_file(log) for log in everything)
     return Inspection(files, channels, tuple(findings), open_choices, assumptions)

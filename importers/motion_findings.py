@@ -39,7 +39,7 @@ def _check_offset(match: YawMatch) -> Finding:
             f"Set input.imu.time_offset_s = {match.offset_s:.2f} (on top of any you have set), and check it by the residuals."
         )
         return Finding("warning", "time-offset", text, hint)
-    return Finding("info", "time-offset", f"IMU and GNSS agree in time: the estimated offset is {figure}.", "")
+    return Finding("info", "time-offset", f"IMU and GNSS agree in time, to about 0.1 s: the estimated offset is {figure}.", "")
 
 
 def _check_yaw(match: YawMatch) -> list[Finding]:

@@ -30,9 +30,9 @@ _HARDEST_BRAKING = 12.0
 
 @dataclass(frozen=True, slots=True)
 class YawMatch:
-    """offset_s: to be added to the IMU's stamps to agree with GNSS; std_s: its standard deviation as the noise has it (a
-    receiver's own delay comes on top). correlation: of course rate with yaw rate there, -1 to 1. slope: course rate per yaw
-    rate."""
+    """offset_s: to be added to the IMU's stamps to agree with GNSS; std_s: its standard deviation as the noise has it. On top
+    come the receiver's own delay, and d / speed where the antenna is d behind the IMU: together about 0.1 s. correlation: of
+    course rate with yaw rate there, -1 to 1. slope: course rate per yaw rate."""
 
     offset_s: float
     std_s: float

@@ -20,7 +20,7 @@ _HORIZONTAL = (("forward", "back"), ("right", "left"))
 
 
 def preflight(timeline: Timeline) -> tuple[Finding, ...]:
-    """All findings about a timeline, errors first."""
+    """All findings about a timeline, errors first, one of a kind."""
     findings: list[Finding] = []
     imu, fixes, reference = timeline.imu, timeline.fixes, timeline.reference
     seen = ", ".join(f"{use.name} ({use.type})" for use in timeline.provenance.channels) or "no channel at all"
@@ -39,7 +39,10 @@ def preflight(timeline: Timeline) -> tuple[Finding, ...]:
         findings += apart or check_motion(imu, fixes)
     if reference is not None:
         findings += _check_reference(reference, imu, fixes)
-    return tuple(sorted(findings, key=lambda finding: _LEVELS.index(finding.level)))
+    once: dict[str, Finding] = {}
+    for finding in findings:
+        once.setdefault(finding.code, finding)
+    return tuple(sorted(once.values(), key=lambda finding: _LEVELS.index(finding.level)))
 
 
 def _check_gravity(imu: ImuSeries, fixes: GnssFixSeries | None) -> list[Finding]:

@@ -92,7 +92,7 @@ def longest_increasing(t_ns: Times) -> NDArray[np.intp]:
         if place == len(tails):
             tails.append(value)
             tail_rows.append(row)
-        else:
+        elif value < tails[place]:
             tails[place] = value
             tail_rows[place] = row
         previous[row] = tail_rows[place - 1] if place else -1
