@@ -25,9 +25,12 @@ _VELOCITY_STD_IN_MOTION = 2.0
 
 
 class Alignment(NamedTuple):
-    """Start of a filter at the fix with index fix, at t_ns: attitude q_nb (4,) with cov_att (3, 3) of the rotation vector in n
-    [rad^2], to which, where levelled, the tilt comes that the accelerometer biases cause; vel_n (3,) [m/s] with standard deviation vel_std, for a fix without velocity; gyro_bias (3,) [rad/s] with
-    standard deviation gyro_bias_std. text says what was done, warnings what to look at."""
+    """Start of a filter at the fix with index fix, at t_ns.
+
+    q_nb (4,) with cov_att (3, 3) of the rotation vector in n [rad^2], to which, where levelled, the tilt comes that the
+    accelerometer biases cause. vel_n (3,) [m/s] with standard deviation vel_std, for a fix without velocity. gyro_bias (3,)
+    [rad/s] with standard deviation gyro_bias_std. text says what was done, warnings what to look at.
+    """
 
     t_ns: int
     fix: int
