@@ -71,7 +71,7 @@ def label_methods(results: Sequence[RunResult]) -> tuple[str, ...]:
 def _title(result: RunResult) -> tuple[str, str]:
     files = [Path(file.path).name for file in result.timeline.provenance.files]
     start, end = utc_text(result.solution.t_ns[[0, -1]])
-    return ", ".join(files) or "Drive", f"{start[:19].replace('T', ' ')} to {end[11:19]} UTC, method {result.solution.method}"
+    return ", ".join(files) or "Drive", f"{start[:19].replace('T', ' ')} to {end[11:19]} UTC"
 
 
 def _write_files(out_dir: Path, writers: dict[str, Callable[[Path], object]]) -> dict[str, Path]:

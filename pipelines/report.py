@@ -3,6 +3,7 @@
 import json
 import math
 import platform
+import re
 from collections.abc import Mapping
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
@@ -32,6 +33,8 @@ __all__ = ["Report", "build_report", "dump_json", "outage_errors"]
 
 Report = dict[str, Any]
 _SCHEMA = "navreplay report 1"
+_FIGURE = re.compile(r"\d[\d.e+-]*")
+"""Figures in a reason, which differ from epoch to epoch; without them equal reasons are counted together."""
 _DEPENDENCIES = ("numpy", "scipy", "numba", "rosbags", "mcap", "rerun-sdk")
 
 
@@ -128,7 +131,8 @@ def _scale(statistics: Statistics, factor: float) -> dict[str, float]:
 
 
 def _describe_innovations(series: InnovationSeries) -> dict[str, Any]:
-    rejected = [reason for reason, used in zip(series.reason, series.used.tolist(), strict=True) if not used]
+    reasons = zip(series.reason, series.used.tolist(), strict=True)
+    rejected = [_FIGURE.sub("…", reason) for reason, used in reasons if not used]
     ratio = series.noise_std / series.nominal_std
     return {
         "unit": series.unit,

@@ -177,11 +177,11 @@ def _plot_deviations(solution: Solution, shades: Sequence[tuple[float, float]]) 
 
 def _plot_attitude(solution: Solution, shades: Sequence[tuple[float, float]]) -> Plot:
     t = _elapsed(solution.t_ns, solution)
-    angles = np.degrees(euler_from_quat(solution.q_nb))
+    angles = np.degrees(np.unwrap(euler_from_quat(solution.q_nb), axis=0))
     panels = [
         Panel(f"{name} [deg]", (Layer("line", t, angles[:, i], "c1", name),)) for i, name in enumerate(("roll", "pitch", "yaw"))
     ]
-    return _time_plot("Attitude", "Yaw is clockwise from north.", (), panels, solution, shades)
+    return _time_plot("Attitude", "Yaw is clockwise from north and counts on beyond a full turn.", (), panels, solution, shades)
 
 
 def _plot_innovations(series: InnovationSeries, solution: Solution, shades: Sequence[tuple[float, float]]) -> Plot:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
-from navreplay.earth import ned_between
+from navreplay.earth import SEMI_MAJOR_AXIS, ned_between
 from navreplay.rotation import enu_from_ned, frd_ned_from_flu_enu, quat_from_matrix, scalar_last_from_first
 from navreplay.solution import Solution
 from navreplay.timeline import FixStatus, Floats
@@ -20,6 +20,8 @@ __all__ = ["recording_id", "write_recording"]
 
 _APPLICATION = "navreplay"
 _ELLIPSOIDS = 200
+_ASPECT, _MAP_ASPECT = 1.5, 2.1
+"""Width over height of the two views, for the track to fit into."""
 _BLUE, _GREY, _RED, _PALE = (88, 140, 255), (150, 160, 176), (235, 70, 70), (120, 135, 175)
 _FIX_COLORS = {
     FixStatus.UNKNOWN: _GREY,
@@ -67,10 +69,10 @@ def _local(origin: Floats, lla: Floats) -> Floats:
 
 def _layout(result: RunResult, track: Floats) -> Any:
     low, high = track.min(axis=0), track.max(axis=0)
-    middle, size = (low + high) / 2, max(float((high - low)[:2].max()), 10.0)
-    eye = middle + np.array([0.0, -0.5, 0.75]) * size
-    metres_per_degree = 111_320.0
-    zoom = np.clip(np.log2(360 * metres_per_degree * np.cos(result.solution.lla[0, 0]) / (size * 0.7)), 1, 18)
+    middle, (wide, tall, _) = (low + high) / 2, np.maximum(high - low, 10.0)
+    eye = middle + np.array([0.0, -0.5, 0.75]) * max(wide, _ASPECT * tall)
+    circumference = 2 * np.pi * SEMI_MAJOR_AXIS * np.cos(result.solution.lla[0, 0])
+    zoom = np.clip(np.log2(circumference / (0.5 * max(wide, _MAP_ASPECT * tall))), 1, 18)
     duration_s = float(result.solution.t_ns[-1] - result.solution.t_ns[0]) / 1e9
     return build_layout(list_stacks(result), duration_s, tuple(eye.tolist()), tuple(middle.tolist()), float(zoom))
 

@@ -36,7 +36,8 @@ class Scale:
         first, last = np.floor(np.log10(self.linear_to)) + 1, np.floor(np.log10(max(-self.low, self.high)))
         decades = 10.0 ** np.arange(last, first - 1, -max(1, np.ceil((last - first + 1) / max(count // 2, 1))))
         ticks = sorted([*-decades, 0.0, *decades])
-        return [tick for tick in ticks if self.low <= tick <= self.high]
+        within = [tick for tick in ticks if self.low <= tick <= self.high]
+        return within if len(within) > 2 else nice_ticks(self.low, self.high, count)
 
 
 def nice_ticks(low: float, high: float, count: int) -> list[float]:

@@ -13,7 +13,7 @@ from pipelines.scales import Scale, nice_ticks, thin_band, thin_line, time_label
 __all__ = ["Layer", "Panel", "draw_map", "draw_time_panels"]
 
 _WIDTH = 520.0
-_LEFT, _RIGHT, _BOTTOM = 52.0, 8.0, 20.0
+_LEFT, _RIGHT, _BOTTOM = 66.0, 8.0, 22.0
 _PANEL_HEIGHT, _GAP = 104.0, 12.0
 _MOST_DOTS = 4000
 
@@ -107,7 +107,7 @@ def _draw_panel(panel: Panel, across: Scale, shades: Sequence[tuple[float, float
     low, high = _extent(panel.layers)
     up = Scale(low, high, _PANEL_HEIGHT, panel.linear_to)
     parts = []
-    for tick in up.ticks(4):
+    for tick in up.ticks(5):
         y = top + _PANEL_HEIGHT - float(up.place(np.array(tick)))
         parts.append(f'<path class="grid" d="M{_LEFT} {y:.1f}H{_WIDTH - _RIGHT}"/>')
         parts.append(f'<text class="tick" x="{_LEFT - 5}" y="{y + 3.5:.1f}" text-anchor="end">{_number(tick)}</text>')
@@ -154,12 +154,12 @@ def draw_map(layers: Sequence[Layer], unit: str = "m") -> str:
     per_pixel = size / inner
     tall = min(max((spans[1][1] - spans[1][0]) * 1.08 / per_pixel + 16, inner * 0.45), inner)
     across, up = (_centred(span, pixels, per_pixel) for span, pixels in zip(spans, (inner, tall), strict=True))
-    height = tall + 30
+    height = tall + 38
     parts = [f'<svg class="plot map" viewBox="0 0 {_WIDTH:g} {height:.0f}" role="img">']
     for tick in nice_ticks(across.low, across.high, 6):
         x = _LEFT + float(across.place(np.array(tick)))
         parts.append(f'<path class="grid" d="M{x:.1f} 4V{tall + 4:.1f}"/>')
-        parts.append(f'<text class="tick" x="{x:.1f}" y="{tall + 17:.1f}" text-anchor="middle">{_number(tick)}</text>')
+        parts.append(f'<text class="tick" x="{x:.1f}" y="{tall + 18:.1f}" text-anchor="middle">{_number(tick)}</text>')
     for tick in nice_ticks(up.low, up.high, 6):
         y = 4 + tall - float(up.place(np.array(tick)))
         parts.append(f'<path class="grid" d="M{_LEFT} {y:.1f}H{_WIDTH - _RIGHT}"/>')
@@ -168,7 +168,7 @@ def draw_map(layers: Sequence[Layer], unit: str = "m") -> str:
     parts += [_draw_layer(layer, across, up, x_ordered=False) for layer in layers]
     parts.append(f'</svg><rect class="frame" x="{_LEFT}" y="4" width="{inner}" height="{tall:.1f}"/>')
     parts.append(f'<text class="label" transform="translate(11 {4 + tall / 2:.1f}) rotate(-90)">north [{unit}]</text>')
-    parts.append(f'<text class="label" x="{_LEFT + inner / 2}" y="{height - 1:.1f}">east [{unit}]</text></svg>')
+    parts.append(f'<text class="label" x="{_LEFT + inner / 2}" y="{height - 3:.1f}">east [{unit}]</text></svg>')
     return "".join(parts)
 
 
