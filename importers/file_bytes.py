@@ -1,6 +1,9 @@
-"""The bytes of a log file, mapped rather than read."""
+"""The bytes of a log file, mapped rather than read; scratch files beside it where that does not do."""
 
 import mmap
+import shutil
+import tempfile
+import weakref
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +11,7 @@ import numpy as np
 from importers.message_blocks import Buffer
 from navreplay.timeline import LogError
 
-__all__ = ["map_file"]
+__all__ = ["map_file", "scratch_file"]
 
 
 def map_file(path: str, magic: bytes, format_name: str) -> Buffer:
@@ -29,3 +32,10 @@ def map_file(path: str, magic: bytes, format_name: str) -> Buffer:
             return np.frombuffer(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ), dtype=np.uint8)
     except OSError as error:
         raise LogError(f"{path}: cannot be read: {error.strerror}") from error
+
+
+def scratch_file(owner: object, name: str) -> Path:
+    """A path for a temporary file of this name, removed when the owner goes away."""
+    directory = tempfile.mkdtemp(prefix="navreplay-")
+    weakref.finalize(owner, shutil.rmtree, directory, ignore_errors=True)
+    return Path(directory) / name

@@ -1,8 +1,5 @@
 """Reader of ROS 2 bags: a directory with metadata.yaml, or a bare storage file; sqlite3 and MCAP storage."""
 
-import shutil
-import tempfile
-import weakref
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +10,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from importers.channel_reading import require_channels
+from importers.file_bytes import scratch_file
 from importers.log import Channel, Log, Table
 from importers.mcap_log import McapLog
 from importers.message_blocks import join_columns
@@ -132,10 +130,8 @@ class Ros2Bag:
         return storage(str(path))
 
     def _unpack(self, path: Path) -> Path:
-        """Decompress a storage file into a directory that goes away with this object."""
-        scratch = tempfile.mkdtemp(prefix="navreplay-")
-        weakref.finalize(self, shutil.rmtree, scratch, ignore_errors=True)
-        unpacked = Path(scratch) / path.stem
+        """Decompress a storage file into a file that goes away with this object."""
+        unpacked = scratch_file(self, path.stem)
         try:
             with path.open("rb") as packed, unpacked.open("wb") as plain:
                 zstandard.ZstdDecompressor().copy_stream(packed, plain)

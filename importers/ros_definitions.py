@@ -61,7 +61,8 @@ def find_type(name: str, definition: str, language: str, encoding: str) -> RosTy
     if definition.strip():
         store = _parse(name, definition, language)
     else:
-        store = get_typestore(Stores.ROS1_NOETIC if encoding == "ros1" else Stores.LATEST)
+        # Recorders since ROS 2 Iron store definitions, so a log without them is at most as new as Humble.
+        store = get_typestore(Stores.ROS1_NOETIC if encoding == "ros1" else Stores.ROS2_HUMBLE)
     if name not in store.fielddefs:
         raise LogError(
             f"type {name} is not defined in the log and is no standard type of ROS; record its definition with the log"

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from importers.channel_reading import read_tables, require_channels
-from importers.file_bytes import map_file
+from importers.file_bytes import map_file, scratch_file
 from importers.log import Channel, Table
-from importers.message_blocks import Block, Decoder
+from importers.message_blocks import Block, Buffer, Decoder
 from navreplay.timeline import LogError
 
 __all__ = ["SqliteStorage"]
@@ -30,12 +30,13 @@ class SqliteStorage:
     def __init__(self, path: str) -> None:
         self.path = str(path)
         self.notes: tuple[str, ...] = ()
-        map_file(self.path, _MAGIC, "a sqlite3 storage file of ROS 2")
+        self._database = self._whole_pages(map_file(self.path, _MAGIC, "a sqlite3 storage file of ROS 2"))
         try:
             self._load()
         except sqlite3.DatabaseError as error:
+            reason = str(error).partition("\n")[0]
             raise LogError(
-                f"{self.path}: no readable ROS 2 storage ({error}); is the file damaged, or of another program?"
+                f"{self.path}: no readable ROS 2 storage ({reason}); is the file damaged, or of another program?"
             ) from error
 
     def channels(self) -> tuple[Channel, ...]:
@@ -54,10 +55,25 @@ class SqliteStorage:
         numbers = {name: self._numbers(name) for name in names}
         return read_tables(self.path, numbers, self._decoder, self._messages, self._counts)
 
+    def _whole_pages(self, content: Buffer) -> Path:
+        """The file, or a copy without its last page where that was cut: SQLite would take what is missing for zeros."""
+        page = int.from_bytes(content[16:18].tobytes(), "big")
+        rest = len(content) % (page if page > 1 else 65536)
+        if not rest:
+            return Path(self.path)
+        self._note(f"the file is cut off within a page; its last {rest} bytes were left out")
+        copy = scratch_file(self, Path(self.path).name)
+        content[: len(content) - rest].tofile(copy)
+        return copy
+
     def _connect(self) -> sqlite3.Connection:
         # Without a write-ahead log beside it nobody writes to the file, so it need not be locked (nor its folder writable).
-        writing = Path(f"{self.path}-wal").exists()
-        return sqlite3.connect(f"{Path(self.path).absolute().as_uri()}?{'mode=ro' if writing else 'immutable=1'}", uri=True)
+        writing = self._database.with_name(f"{self._database.name}-wal").exists()
+        mode = "mode=ro" if writing else "immutable=1"
+        database = sqlite3.connect(f"{self._database.absolute().as_uri()}?{mode}", uri=True)
+        # Nothing is written; this is what lets SQLite open a file that is shorter than its header says.
+        database.execute("PRAGMA writable_schema = ON")
+        return database
 
     def _load(self) -> None:
         with closing(self._connect()) as database:
@@ -94,18 +110,22 @@ class SqliteStorage:
         marks = ",".join("?" * len(wanted))
         query = f"SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({marks}) ORDER BY id"
         with closing(self._connect()) as database:
-            cursor = database.execute(query, tuple(wanted))
-            block = _block_of(cursor, self._note)
+            rows = _rows(database, query, tuple(wanted))
+            block = _block_of(rows, self._note)
             while block:
                 yield block
-                block = _block_of(cursor, self._note)
+                block = _block_of(rows, self._note)
 
 
-def _block_of(cursor: sqlite3.Cursor, note: Callable[[str], None]) -> Block | None:
+def _rows(database: sqlite3.Connection, query: str, values: tuple[int, ...]) -> Iterator[tuple[object, object, object]]:
+    yield from database.execute(query, values)
+
+
+def _block_of(rows: Iterator[tuple[object, object, object]], note: Callable[[str], None]) -> Block | None:
     """The next few thousand rows (topic, time, message); None at the end, and behind damage."""
     topics, times, stops, buffer = [], [], [0], bytearray()
     try:
-        for topic, time, message in islice(cursor, _BLOCK_MESSAGES):
+        for topic, time, message in islice(rows, _BLOCK_MESSAGES):
             # A damaged row may hold anything; that it is lost shows in the balance with the count.
             if isinstance(time, int) and isinstance(message, bytes):
                 buffer += message
