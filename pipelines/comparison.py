@@ -58,7 +58,9 @@ def comparison_tables(report: Report) -> tuple[Table, ...]:
 
 
 def _error_table(report: Report, quantity: str, stretch: str) -> Table:
-    rows, components, unit = [], (), ""
+    rows: list[tuple[str, ...]] = []
+    components: tuple[str, ...] = ()
+    unit = ""
     for label, method in report["methods"].items():
         table = method["errors"][stretch].get(quantity)
         if table is None:

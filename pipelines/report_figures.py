@@ -95,7 +95,8 @@ def _plot_track(result: RunResult) -> Plot:
         layers.append(Layer("line", lost[:, 1], lost[:, 0], "lost", "solution in outages"))
     rejected = _rejected_fixes(result)
     if len(rejected):
-        layers.append(Layer("crosses", *ned_between(origin, rejected)[:, [1, 0]].T, "bad", "rejected fix"))
+        where = ned_between(origin, rejected)
+        layers.append(Layer("crosses", where[:, 1], where[:, 0], "bad", "rejected fix"))
     legend = tuple((f"{layer.kind} {layer.style}", layer.name) for layer in layers)
     lat, lon = np.degrees(origin[:2])
     return Plot("Track", f"East and north of the first position, {lat:.6f}°, {lon:.6f}°.", legend, draw_map(layers))

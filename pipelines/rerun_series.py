@@ -1,5 +1,7 @@
 """The time series of a recording: errors, innovations, noise and biases, and the plots that show them."""
 
+from typing import Literal
+
 import numpy as np
 import rerun as rr
 
@@ -12,6 +14,7 @@ from pipelines.result import RunResult
 __all__ = ["list_stacks", "send_biases", "send_errors", "send_innovations", "time_columns"]
 
 Color = tuple[int, int, int]
+Marker = Literal["circle", "cross"]
 _DPH = np.degrees(3600)
 _MG = 1 / 9.80665e-3
 _BLUE, _GREY, _RED, _PALE = (88, 140, 255), (150, 160, 176), (235, 70, 70), (120, 135, 175)
@@ -52,7 +55,13 @@ def _send_line(
 
 
 def _send_dots(
-    recording: rr.RecordingStream, path: str, times: list[rr.TimeColumn], values: Floats, name: str, color: Color, marker: str
+    recording: rr.RecordingStream,
+    path: str,
+    times: list[rr.TimeColumn],
+    values: Floats,
+    name: str,
+    color: Color,
+    marker: Marker,
 ) -> None:
     recording.log(path, rr.SeriesPoints(colors=color, names=name, markers=marker, marker_sizes=2.5), static=True)
     recording.send_columns(path, indexes=times, columns=rr.Scalars.columns(scalars=values))

@@ -24,7 +24,7 @@ class Scale:
     def place(self, values: Floats) -> Floats:
         """Pixels (n,) from the low end of values (n,)."""
         low, high = self._bend(np.array([self.low, self.high]))
-        return (self._bend(values) - low) / (high - low) * self.pixels
+        return np.asarray((self._bend(values) - low) / (high - low) * self.pixels)
 
     def _bend(self, values: Floats) -> Floats:
         return values if self.linear_to is None else np.arcsinh(values / self.linear_to)
