@@ -1,7 +1,5 @@
 """The time series of a recording: errors, innovations, noise and biases, and the plots that show them."""
 
-from typing import Literal
-
 import numpy as np
 import rerun as rr
 
@@ -14,7 +12,6 @@ from pipelines.result import RunResult
 __all__ = ["list_stacks", "send_biases", "send_errors", "send_innovations", "time_columns"]
 
 Color = tuple[int, int, int]
-Marker = Literal["circle", "cross"]
 _DPH = np.degrees(3600)
 _MG = 1 / 9.80665e-3
 _BLUE, _GREY, _RED, _PALE = (88, 140, 255), (150, 160, 176), (235, 70, 70), (120, 135, 175)
@@ -54,16 +51,13 @@ def _send_line(
     recording.send_columns(path, indexes=times, columns=rr.Scalars.columns(scalars=values))
 
 
-def _send_dots(
-    recording: rr.RecordingStream,
-    path: str,
-    times: list[rr.TimeColumn],
-    values: Floats,
-    name: str,
-    color: Color,
-    marker: Marker,
-) -> None:
-    recording.log(path, rr.SeriesPoints(colors=color, names=name, markers=marker, marker_sizes=2.5), static=True)
+def _send_dots(recording: rr.RecordingStream, path: str, times: list[rr.TimeColumn], values: Floats, *, used: bool) -> None:
+    style = (
+        rr.SeriesPoints(colors=_BLUE, names="used", markers="circle", marker_sizes=2.5)
+        if used
+        else rr.SeriesPoints(colors=_RED, names="rejected", markers="cross", marker_sizes=2.5)
+    )
+    recording.log(path, style, static=True)
     recording.send_columns(path, indexes=times, columns=rr.Scalars.columns(scalars=values))
 
 
@@ -93,13 +87,10 @@ def send_innovations(recording: rr.RecordingStream, solution: Solution) -> None:
             path = f"/innovations/{series.kind}/{label}"
             _send_line(recording, f"{path}/upper", times, 3 * series.std[:, i], "+3 sigma", _PALE)
             _send_line(recording, f"{path}/lower", times, -3 * series.std[:, i], "-3 sigma", _PALE)
-            for name, rows, color, marker in (
-                ("used", series.used, _BLUE, "circle"),
-                ("rejected", ~series.used, _RED, "cross"),
-            ):
+            for name, rows in (("used", series.used), ("rejected", ~series.used)):
                 if rows.any():
                     shown = time_columns(series.t_ns[rows], solution)
-                    _send_dots(recording, f"{path}/{name}", shown, series.residual[rows, i], name, color, marker)
+                    _send_dots(recording, f"{path}/{name}", shown, series.residual[rows, i], used=name == "used")
             noise = f"/noise/{series.kind}/{label}"
             _send_line(recording, f"{noise}/told", times, series.nominal_std[:, i], "told", _GREY)
             _send_line(recording, f"{noise}/used", times, series.noise_std[:, i], "used", _ORANGE)
