@@ -11,19 +11,20 @@ __all__ = ["cut_at_gaps", "tell_unreached_fixes"]
 
 
 def cut_at_gaps(imu: ImuSeries, options: GapOptions, recorder: Recorder) -> list[ImuSeries]:
-    """The stretches; what happens at each gap is recorded. Raises LogError on a gap that the options refuse, or if nothing is left."""
+    """The stretches, each gap recorded. Raises LogError on a gap that the options refuse, or when nothing is left."""
     dt = np.diff(imu.t_ns)
     longest = int(options.bridge_s * 1e9)
     bridged = np.flatnonzero(find_gaps(imu.t_ns) & (dt <= longest))
     if len(bridged):
-        text = f"{len(bridged)} gaps of the IMU are bridged, {dt[bridged].sum() / 1e9:.3f} s in all, the longest {dt[bridged].max() / 1e9:.3f} s"
+        total, worst = dt[bridged].sum() / 1e9, dt[bridged].max() / 1e9
+        text = f"gaps of the IMU that are bridged: {len(bridged)}, {total:.3f} s in all, the longest {worst:.3f} s"
         recorder.tell(int(imu.t_ns[bridged[0]]), "warning", text)
     for i in np.flatnonzero(dt > longest).tolist():
         seconds = f"{dt[i] / 1e9:.3f} s"
         if options.longer == "refuse":
             raise LogError(
-                f"imu: a gap of {seconds} is longer than gaps.bridge_s = {options.bridge_s:g}; raise that, or set gaps.longer = "
-                "'reset' to align anew behind it"
+                f"imu: a gap of {seconds} is longer than gaps.bridge_s = {options.bridge_s:g}; raise that, or set "
+                "gaps.longer = 'reset' to align anew behind it"
             )
         text = f"the IMU is silent for {seconds}; the filter aligns anew behind the gap"
         recorder.tell(int(imu.t_ns[i]), "warning", text)
@@ -41,6 +42,5 @@ def tell_unreached_fixes(fixes: GnssFixSeries, stretches: list[ImuSeries], recor
     if not reached.all():
         count = int((~reached).sum())
         first = int(fixes.t_ns[np.argmin(reached)])
-        recorder.tell(
-            first, "warning", f"{count} of {len(fixes)} fixes lie outside the IMU's time span or in its gaps; they are not used"
-        )
+        text = f"{count} of {len(fixes)} fixes lie outside the IMU's time span or in its gaps; they are not used"
+        recorder.tell(first, "warning", text)
