@@ -71,7 +71,9 @@ def find_type(name: str, definition: str, language: str, encoding: str) -> RosTy
     try:
         fixed = _flatten(store, name, "", "", leaves)
     except (KeyError, RecursionError) as error:
-        raise LogError(f"the definition of type {name} in the log is incomplete ({error}); is the file damaged?") from error
+        raise LogError(
+            f"the definition of type {name} in the log cannot be resolved ({error}); is the file damaged?"
+        ) from error
     return RosType(name, store, tuple(leaves), fixed and bool(leaves))
 
 
@@ -109,25 +111,25 @@ def _flatten(store: Typestore, name: str, path: str, attribute: str, leaves: lis
             else:
                 fixed &= _flatten(store, detail, f"{where}.", f"{attr}.", leaves)
             continue
+        if node in (Nodetype.ARRAY, Nodetype.SEQUENCE) and detail[0][0] == Nodetype.NAME:
+            _flatten(store, detail[0][1], "", "", [])  # no column, but what it is made of must be known
+            fixed = False
+            continue
         leaf = _leaf(node, detail, where, attr)
-        if leaf:
-            leaves.append(leaf)
-        fixed &= leaf is not None and leaf.kind is not Kind.LIST
+        leaves.append(leaf)
+        fixed &= leaf.kind is not Kind.LIST
     return fixed
 
 
-def _leaf(node: int, detail: Any, path: str, attribute: str) -> Leaf | None:
-    """The leaf of a basic type or an array of one; None where it has no column (arrays of messages, wide strings)."""
+def _leaf(node: int, detail: Any, path: str, attribute: str) -> Leaf:
+    """The leaf of a basic type or an array of one. Raises KeyError for a type that rosbags cannot read (wide strings)."""
+    basic = detail[0] if node == Nodetype.BASE else detail[0][1][0]
+    dtype = np.dtype(object) if basic == "string" else np.dtype(_DTYPES[basic])
     if node == Nodetype.BASE:
-        if detail[0] == "string":
-            return Leaf(path, (attribute,), Kind.TEXT, np.dtype(object))
-        return Leaf(path, (attribute,), Kind.NUMBER, np.dtype(_DTYPES[detail[0]])) if detail[0] in _DTYPES else None
-    (element, basic), count = detail
-    if element != Nodetype.BASE or basic[0] not in (*_DTYPES, "string"):
-        return None
-    if node == Nodetype.ARRAY and basic[0] != "string":
-        return Leaf(path, (attribute,), Kind.ARRAY, np.dtype(_DTYPES[basic[0]]), count)
-    return Leaf(path, (attribute,), Kind.LIST, np.dtype(_DTYPES.get(basic[0], object)))
+        return Leaf(path, (attribute,), Kind.TEXT if basic == "string" else Kind.NUMBER, dtype)
+    if node == Nodetype.ARRAY and basic != "string":
+        return Leaf(path, (attribute,), Kind.ARRAY, dtype, detail[1])
+    return Leaf(path, (attribute,), Kind.LIST, dtype)
 
 
 def _merged(store: Typestore, name: str, path: str, attribute: str) -> Leaf | None:

@@ -196,7 +196,9 @@ def test_unknown_type_is_named() -> None:
         find_type("my_msgs/msg/Speed", "", "msg", "cdr")
 
 
-@pytest.mark.parametrize("text", ["float64 = = =", "my_msgs/Missing part", "\x00\x01"])
+@pytest.mark.parametrize(
+    "text", ["float64 = = =", "my_msgs/Missing part", "my_msgs/Missing[] parts", "wstring name", "\x00\x01"]
+)
 def test_broken_definition_is_told(text: str) -> None:
     with pytest.raises(LogError, match=r"the definition of type my_msgs/msg/Speed in the log .*is the file damaged\?"):
         find_type("my_msgs/msg/Speed", text, "msg", "cdr")
