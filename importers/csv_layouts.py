@@ -63,6 +63,7 @@ def read_layout(path: str, layout: str) -> Table:
         text,
         {name: i for name, i in index.items() if name in wanted and i in text.frame.columns},
         {"status": index["status"]} if with_status else None,
+        [name for name in ("t_gps_ns",) if name in index],
     )
     if selection.read == 0:
         raise LogError(f"{path}: the file holds a header but no rows; was the recording stopped before it began?")

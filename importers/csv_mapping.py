@@ -61,7 +61,8 @@ def read_mapped(path: str, mapping: CsvMapping, gps_week: int | None, leap: Leap
     (texts if dated else numbers).update(times)
     if mapping.time.week_column is not None:
         numbers["week"] = _find_column(text, mapping.time.week_column, place)
-    selection = select_columns(text, numbers, texts)
+    counted = list(times) if not dated and mapping.time.unit == "ns" and mapping.variable is None else []
+    selection = select_columns(text, numbers, texts, counted)
     if selection.read == 0:
         raise LogError(f"{path}: the file holds no rows")
     t_ns, timed = _read_times(selection, mapping.time, gps_week, leap, place)

@@ -77,7 +77,7 @@ def inspect_logs(
         for log in everything
         for channel in log.channels()
     )
-    damage = [note for log in everything for note in log.notes]
+    damage = [f"{log.path}: {note}" for log in everything for note in log.notes]
     findings += [Finding("warning", "damaged", note, "") for note in damage]
     usable = [choice for choice in chosen if (id(choice.log), choice.channel.name) in tables]
     assumptions: tuple[str, ...] = ()

@@ -86,7 +86,7 @@ def _position_covariance(columns: Mapping[str, np.ndarray]) -> Floats:
     cov = np.where(diagonal[:, None, None], cov * np.eye(3), cov)
     cov = _NED_OF_ENU @ cov @ _NED_OF_ENU.T
     cov[kind == 0] = np.nan
-    return cov
+    return np.asarray(cov)
 
 
 def _satellite_status(code: np.ndarray, cov: Floats) -> np.ndarray:

@@ -45,6 +45,8 @@ def read_pos(path: str, leap: LeapSeconds) -> Table:
     if text.read == 0:
         raise LogError(f"{path}: the position file holds no rows; did the receiver or the processing have any fix?")
     index = {name: i + 2 for i, name in enumerate(names[1:]) if i + 2 in text.frame.columns}
+    if not index.keys() >= set(names[1:4]):
+        raise LogError(f"{path}: its lines have {text.frame.shape[1]} fields, too few for what its header names; is it cut?")
     dated = not pd.api.types.is_numeric_dtype(text.frame.get(0, pd.Series(dtype=float)))
     clock = {"first": 0, "second": 1}
     selection = select_columns(text, index if dated else index | clock, clock if dated else None)

@@ -4,7 +4,7 @@ Lines are counted and split with numpy before pandas sees them, so that a damage
 """
 
 import csv
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -21,17 +21,21 @@ _NEWLINE = 10
 # From pandas 3.1 on, numbers are always rounded correctly and the option is deprecated.
 _EXACT_FLOATS = {} if tuple(map(int, pd.__version__.split(".")[:2])) >= (3, 1) else {"float_precision": "round_trip"}
 _HEAD_LINES = 50
+_INT64 = r"[+-]?(\d{1,18}|[1-8]\d{18})"
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TextTable:
-    """A parsed text. names: of the columns from the header line, empty without one. frame: columns 0 to k - 1. read: lines that
-    are neither blank nor comments nor header. rejected: count per reason of the lines that are not in the frame."""
+    """A parsed text. names: of the columns from the header line, empty without one. frame: columns 0 to k - 1. read: lines
+    that are neither blank nor comments nor header. rejected: count per reason of the lines that are not in the frame. lines,
+    delimiter: the text of the frame, for cells that a double cannot hold."""
 
     names: tuple[str, ...]
     frame: pd.DataFrame
     read: int
     rejected: Mapping[str, int]
+    lines: bytes = b""
+    delimiter: str = ","
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -81,14 +85,24 @@ def parse_text(
     damaged = _count_marks(np.flatnonzero(buffer == 0), starts, ends) > 0
     odd = ~damaged & (fields != expected)
     good = ~damaged & ~odd
-    frame = _parse_lines(_join_lines(buffer, starts[good], ends[good]), delimiter, expected)
+    lines = _join_lines(buffer, starts[good], ends[good])
+    frame = _parse_lines(lines, delimiter, expected)
     counts = {"zero bytes in the line": int(damaged.sum()), "wrong number of fields": int(odd.sum())}
-    return TextTable(names, frame, len(starts), {reason: count for reason, count in counts.items() if count})
+    rejected = {reason: count for reason, count in counts.items() if count}
+    return TextTable(names, frame, len(starts), rejected, lines, delimiter)
 
 
-def select_columns(table: TextTable, numbers: Mapping[str, int], texts: Mapping[str, int] | None = None) -> Selection:
-    """Picks columns by index; a line whose chosen number is neither empty nor a number is rejected."""
-    frame = table.frame
+def select_columns(
+    table: TextTable,
+    numbers: Mapping[str, int],
+    texts: Mapping[str, int] | None = None,
+    integers: Collection[str] = (),
+) -> Selection:
+    """Picks columns by index; a line whose chosen number is neither empty nor a number is rejected.
+
+    integers: numbers that count nanoseconds; they come out as exact int64, and a line where one is empty is rejected.
+    """
+    frame = _with_integers(table, [numbers[name] for name in integers if name in numbers])
     if frame.empty:
         empty = {name: np.empty(0) for name in [*numbers, *(texts or {})]}
         return Selection(empty, table.read, dict(table.rejected))
@@ -98,13 +112,30 @@ def select_columns(table: TextTable, numbers: Mapping[str, int], texts: Mapping[
         if not pd.api.types.is_numeric_dtype(column):
             bad |= (pd.to_numeric(column, errors="coerce").isna() & column.notna()).to_numpy()
     kept = frame[~bad] if bad.any() else frame
-    columns: dict[str, np.ndarray] = {name: pd.to_numeric(kept[index]).to_numpy() for name, index in numbers.items()}
+    columns = {name: _to_numbers(kept[index], name in integers) for name, index in numbers.items()}
     for name, index in (texts or {}).items():
         columns[name] = kept[index].astype(str).to_numpy(dtype=object)
     rejected = dict(table.rejected)
     if bad.any():
         rejected["not a number"] = int(bad.sum())
     return Selection(columns, table.read, rejected)
+
+
+def _to_numbers(column: pd.Series, whole: bool) -> np.ndarray:
+    values = pd.to_numeric(column).to_numpy()
+    return np.asarray(values, dtype=np.int64 if whole else None if values.dtype.kind in "if" else np.float64)
+
+
+def _with_integers(table: TextTable, indices: Sequence[int]) -> pd.DataFrame:
+    """The frame with columns of integers as int64, or as text where they hold anything else: one empty or damaged cell makes
+    pandas round the whole column to doubles."""
+    rounded = [index for index in indices if index in table.frame and table.frame[index].dtype != np.int64]
+    if not rounded:
+        return table.frame
+    texts = _parse_lines(table.lines, table.delimiter, table.frame.shape[1], as_text=True)
+    cells = {index: texts[index].str.strip() for index in rounded}
+    whole = {index: cell.where(cell.str.fullmatch(_INT64), "x") for index, cell in cells.items()}
+    return table.frame.drop(columns=rounded).join(pd.DataFrame(whole))
 
 
 def _split_lines(buffer: NDArray[np.uint8], skip_rows: int, comment: str | None) -> tuple[np.ndarray, np.ndarray]:
@@ -159,7 +190,7 @@ def _join_lines(buffer: NDArray[np.uint8], starts: np.ndarray, ends: np.ndarray)
     return bytes(buffer[np.cumsum(edges[: len(buffer)], dtype=np.int8).astype(bool)])
 
 
-def _parse_lines(lines: bytes, delimiter: str, width: int) -> pd.DataFrame:
+def _parse_lines(lines: bytes, delimiter: str, width: int, as_text: bool = False) -> pd.DataFrame:
     if not lines:
         return pd.DataFrame()
     return pd.read_csv(
@@ -172,6 +203,8 @@ def _parse_lines(lines: bytes, delimiter: str, width: int) -> pd.DataFrame:
         quoting=csv.QUOTE_NONE,
         skipinitialspace=True,
         low_memory=False,
+        dtype=str if as_text else None,
+        keep_default_na=not as_text,
         encoding_errors="replace",
         **_EXACT_FLOATS,
     )

@@ -73,6 +73,15 @@ def test_own_imu_csv_with_byte_order_mark_and_a_cut_last_line(tmp_path):
     assert balanced(table)
 
 
+def test_one_damaged_stamp_does_not_round_the_others(tmp_path):
+    head = "t_gps_ns,gyro_x_radps,gyro_y_radps,gyro_z_radps,accel_x_mps2,accel_y_mps2,accel_z_mps2\n"
+    stamps = ["1436000000000000001", "", "1e300", "99999999999999999999", "1436000000010000003"]
+    path = write(tmp_path, "imu.csv", head + "".join(f"{stamp},0.1,0.2,0.3,1,2,-9.8\n" for stamp in stamps))
+    _, table = read_only_channel(path)
+    assert table.columns["t_gps_ns"].tolist() == [1436000000000000001, 1436000000010000003]
+    assert table.rejected == {"not a number": 3}
+
+
 def test_own_fix_csv_takes_empty_cells_as_unknown(tmp_path):
     head = "t_gps_ns,lat_deg,lon_deg,height_m,vel_n_mps,vel_e_mps,vel_d_mps,std_n_m,std_e_m,std_d_m,status\n"
     body = "1436000000000000000,40,-105,1600,,,,1,2,3,FIXED\n1436000001000000000,,,,1,2,3,,,,\n"
