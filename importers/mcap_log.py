@@ -140,7 +140,7 @@ class McapLog:
                 continue
             if not whole:
                 self._note(f"the chunk at byte {start} is cut off; {len(records)} bytes of it could be unpacked")
-            yield from self._chunk_blocks(records, directory)
+            yield from self._chunk_blocks(records, directory, start if whole else None)
         yield from _message_blocks(self._buffer, walk.op, walk.start, walk.stop)
 
     def _chunks(self, walk: Walk) -> list[tuple[int, int, dict[int, int]]]:
@@ -153,10 +153,12 @@ class McapLog:
                 chunks.append((offset + RECORD_HEAD, limit, {}))
         return sorted(chunks, key=lambda chunk: chunk[0])
 
-    def _chunk_blocks(self, records: Buffer, directory: Directory) -> Iterator[Block]:
+    def _chunk_blocks(self, records: Buffer, directory: Directory, at: int | None) -> Iterator[Block]:
         from importers.record_scan import scan_mcap
 
-        opcode, start, stop, _ = scan_mcap(records, 0)
+        opcode, start, stop, end = scan_mcap(records, 0)
+        if at is not None and end != len(records):
+            self._note(f"the chunk at byte {at} is damaged inside; {len(records) - end} bytes of it were left out")
         for place in np.flatnonzero((opcode == Opcode.SCHEMA) | (opcode == Opcode.CHANNEL)):
             directory.add(opcode[place], records[start[place] : stop[place]])
         yield from _message_blocks(records, opcode, start, stop)

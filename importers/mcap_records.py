@@ -76,6 +76,12 @@ class Directory:
             self.channels.setdefault(channel.id, channel)
         return channel is not None
 
+    def is_complete(self) -> bool:
+        """False where channels or schemas are missing; a summary need not repeat them."""
+        unknown = (self.counts or {}).keys() - self.channels.keys()
+        needed = {channel.schema_id for channel in self.channels.values()} - {0}
+        return bool(self.channels) and not unknown and needed <= self.schemas.keys()
+
 
 def read_summary(buffer: Buffer) -> Directory | None:
     """The directory from the summary section; None where the file has none, or a damaged or incomplete one."""
@@ -108,9 +114,7 @@ def read_summary(buffer: Buffer) -> Directory | None:
                 return None
             offsets.append(index.chunk_start_offset)
     directory.chunk_offsets = np.array(sorted(offsets), dtype=np.int64)
-    # A summary need not repeat the channels; one that does not is no directory.
-    complete = directory.channels and not (directory.counts or {}).keys() - directory.channels.keys()
-    return directory if complete else None
+    return directory if directory.is_complete() else None
 
 
 def walk_file(buffer: Buffer, landmarks: Offsets) -> Walk:

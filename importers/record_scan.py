@@ -3,6 +3,8 @@
 import numpy as np
 from numba import njit
 
+from importers.message_blocks import Buffer, Offsets
+
 __all__ = ["scan_bag", "scan_mcap"]
 
 _MCAP_HEAD = 9
@@ -11,7 +13,7 @@ _FOOTER = 2
 
 
 @njit(cache=True)
-def _mcap_length(buffer, at):
+def _mcap_length(buffer: Buffer, at: int) -> int:
     """Length field of the record at `at`; -1 when it does not fit in what is left of the buffer."""
     left = len(buffer) - at - _MCAP_HEAD
     if left < 0 or buffer[at] == 0:
@@ -26,7 +28,7 @@ def _mcap_length(buffer, at):
 
 
 @njit(cache=True)
-def scan_mcap(buffer, begin):
+def scan_mcap(buffer: Buffer, begin: int) -> tuple[Buffer, Offsets, Offsets, int]:
     """Walk MCAP records (opcode, u64 length, content) from `begin` to the end or to the first damage.
 
     buffer: (N,) uint8. Returns opcode (n,) uint8, start (n,) and stop (n,) of each content, int64, and where the walk ended:
@@ -58,7 +60,7 @@ def scan_mcap(buffer, begin):
 
 
 @njit(cache=True)
-def _u32(buffer, at):
+def _u32(buffer: Buffer, at: int) -> int:
     """Little-endian u32 at `at`; -1 beyond the end."""
     if at + 4 > len(buffer):
         return np.int64(-1)
@@ -69,7 +71,7 @@ def _u32(buffer, at):
 
 
 @njit(cache=True)
-def _bag_record(buffer, at):
+def _bag_record(buffer: Buffer, at: int) -> tuple[int, int, int, int, int]:
     """Op, conn and time out of a record's header, extent of its data; op -1 when there is no whole record at `at`."""
     no_record = (-1, np.int64(-1), np.int64(-1), np.int64(0), np.int64(0))
     header_length = _u32(buffer, at)
@@ -96,7 +98,7 @@ def _bag_record(buffer, at):
 
 
 @njit(cache=True)
-def scan_bag(buffer, begin):
+def scan_bag(buffer: Buffer, begin: int) -> tuple[Offsets, Offsets, Offsets, Offsets, Offsets, Offsets, int]:
     """Walk ROS 1 bag records (u32 header length, header fields, u32 data length, data) from `begin` to the end or to damage.
 
     buffer: (N,) uint8. Returns op (n,), conn (n,) and time_ns (n,) (-1 where the header has none), header start (n,), start

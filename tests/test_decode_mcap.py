@@ -52,6 +52,29 @@ def test_ros_messages(tmp_path: Path, encoding: str, compression: CompressionTyp
     assert ("no usable index" in "".join(log.notes)) == (options not in ({}, {"use_chunking": False}))
 
 
+@pytest.mark.parametrize("options", [{"repeat_schemas": False}, {"repeat_channels": False}], ids=str)
+def test_summary_that_repeats_not_all_is_completed_by_reading(tmp_path: Path, options: dict) -> None:
+    log = McapLog(str(write_mcap(tmp_path / "log.mcap", raw_imus(ROS2, COUNT), **options)))
+    assert log.channels() == (Channel("/imu", IMU, "cdr", COUNT),)
+    assert_imus(log.read(("/imu",))["/imu"], COUNT)
+
+
+def test_broken_record_in_a_chunk_without_checksum(tmp_path: Path) -> None:
+    options = {"compression": CompressionType.NONE, "enable_crcs": False}
+    path = write_mcap(tmp_path / "log.mcap", raw_imus(ROS2, COUNT), **options)
+    (start, stop) = chunk_extents(path)[1]
+    head = path.read_bytes().index(b"imu_link", (start + stop) // 2) - 16 - 22 - 9
+    content = bytearray(path.read_bytes())
+    assert content[head] == Opcode.MESSAGE
+    content[head + 8] = 0xFF
+    path.write_bytes(content)
+    log = McapLog(str(path))
+    table = log.read(("/imu",))["/imu"]
+    assert table.read == COUNT
+    assert 20 < table.rejected["lost to damage in the file"] < 40
+    assert any("is damaged inside" in note for note in log.notes)
+
+
 def test_schema_without_text_takes_the_standard_type(tmp_path: Path) -> None:
     path = tmp_path / "log.mcap"
     with path.open("wb") as file:
