@@ -1,15 +1,17 @@
 """Counts, weeks and stamps as GPS time."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from importers.settings import TimeBase
 from navreplay.time_scales import GPS_EPOCH_UNIX_S, LEAP_SECONDS, LeapSeconds, gps_from_tai, gps_from_utc, load_leap_seconds
 from navreplay.timeline import LogError, Times
 
-__all__ = ["count_ns", "gps_from_gps_unix", "gps_from_stamps", "leap_seconds", "unwrap_weeks"]
+__all__ = ["count_ns", "gps_from_gps_unix", "gps_from_stamps", "is_time", "leap_seconds", "unwrap_weeks"]
 
 _UNIT_NS = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
 _HALF_WEEK_S = 302_400
+_CENTURY_S = 3_200_000_000
 
 
 def leap_seconds(path: object | None) -> LeapSeconds:
@@ -27,6 +29,11 @@ def count_ns(count: np.ndarray, unit: str) -> Times:
     steps = min(scale, 10**6)
     fraction = np.rint((count - whole) * steps).astype(np.int64) * (scale // steps)
     return np.asarray(whole.astype(np.int64) * scale + fraction)
+
+
+def is_time(count: np.ndarray, unit: str = "s") -> NDArray[np.bool_]:
+    """Which counts (n,) are a time within a century of their zero."""
+    return np.asarray(np.abs(count.astype(np.float64)) < _CENTURY_S * (10**9 / _UNIT_NS[unit]))
 
 
 def unwrap_weeks(gps_week: int | None, tow_s: np.ndarray, place: str) -> np.ndarray:

@@ -4,8 +4,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from importers.clock import is_time
 from importers.log import Table
-from importers.rows import diagonal_covariance, status_codes
+from importers.rows import diagonal_covariance, drop_absurd, status_codes
 from importers.text_table import Selection, parse_text, read_bytes, select_columns
 from navreplay.rotation import quat_from_euler
 from navreplay.time_scales import gps_from_week_tow
@@ -76,7 +77,7 @@ def _build_table(selection: Selection) -> Table:
     for key, choices in _GROUPS.items():
         names = next((names for names in choices if columns.keys() >= set(names)), None)
         if names is not None:
-            out[key] = np.column_stack([columns[name] for name in names]).astype(np.float64)
+            out[key] = drop_absurd(np.column_stack([columns[name] for name in names]).astype(np.float64))
     if "lla" in out:
         out["lla"] = out["lla"] * [np.pi / 180, np.pi / 180, 1.0]
     if "euler" in out:
@@ -97,7 +98,7 @@ def _build_table(selection: Selection) -> Table:
 def _drop_untimed(selection: Selection) -> tuple[Mapping[str, np.ndarray], Selection]:
     """Rows without a time cannot be placed; every other empty cell is merely unknown."""
     keys = [key for key in ("t_gps_ns", *_WEEK) if key in selection.columns]
-    timed = np.logical_and.reduce([np.isfinite(selection.columns[key].astype(np.float64)) for key in keys])
+    timed = np.logical_and.reduce([is_time(selection.columns[key], "ns" if key == "t_gps_ns" else "s") for key in keys])
     if timed.all():
         return selection.columns, selection
     columns = {name: values[timed] for name, values in selection.columns.items()}

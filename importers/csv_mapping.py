@@ -8,9 +8,9 @@ import pandas as pd
 from scipy.io import loadmat
 from scipy.io.matlab import MatReadError
 
-from importers.clock import count_ns, gps_from_gps_unix, unwrap_weeks
+from importers.clock import count_ns, gps_from_gps_unix, is_time, unwrap_weeks
 from importers.log import Table
-from importers.rows import NO_FIX, diagonal_covariance, status_codes
+from importers.rows import NO_FIX, diagonal_covariance, drop_absurd, status_codes
 from importers.settings import Column, CsvMapping, CsvTime
 from importers.text_table import Selection, TextTable, parse_text, read_bytes, select_columns
 from navreplay.earth import lla_from_ecef
@@ -112,7 +112,9 @@ def _read_times(
         timed = stamps.notna().to_numpy()
         unix_ns = stamps[timed].dt.tz_localize(None).to_numpy().astype("datetime64[ns]").astype(np.int64)
         return (gps_from_utc(unix_ns, leap) if time.base == "datetime_utc" else gps_from_gps_unix(unix_ns)), timed
-    timed = np.isfinite(parts[0].astype(np.float64))
+    timed = is_time(parts[0], time.unit)
+    if "week" in selection.columns:
+        timed &= is_time(selection.columns["week"])
     count = parts[0][timed]
     if time.base == "gps_tow":
         tow_s = count * _UNIT_S[time.unit]
@@ -130,7 +132,7 @@ def _read_times(
 def _build_columns(selection: Selection, mapping: CsvMapping, timed: np.ndarray, place: str) -> dict[str, np.ndarray]:
     columns = {name: values[timed] for name, values in selection.columns.items()}
     out: dict[str, np.ndarray] = {
-        key: np.column_stack([columns[name] for name in names]).astype(np.float64)
+        key: drop_absurd(np.column_stack([columns[name] for name in names]).astype(np.float64))
         for key, names in _GROUPS.items()
         if columns.keys() >= set(names)
     }

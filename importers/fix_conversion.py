@@ -11,6 +11,8 @@ from navreplay.timeline import ChannelUse, FixStatus, Floats, GnssFixSeries, Log
 
 __all__ = ["clean_covariance", "convert_fixes", "screen_positions"]
 
+_FARTHEST = (np.pi / 2, 2 * np.pi, 1e8)
+_UNKNOWN_VARIANCE = 1e12
 _SAME_EPOCH_NS = 10**6
 _ORDER_OF_STATUS = ("unknown", "single", "differential", "float", "fixed")
 _RANK = {FixStatus.DEAD_RECKONING: 1} | {FixStatus[name.upper()]: rank for rank, name in enumerate(_ORDER_OF_STATUS)}
@@ -25,7 +27,7 @@ def clean_covariance(name: str, cov: Floats | None, n: int) -> tuple[Floats, tup
         return np.full((n, 3, 3), np.nan), ()
     cov = (cov + np.swapaxes(cov, 1, 2)) / 2
     diagonal = np.diagonal(cov, axis1=1, axis2=2)
-    finite = np.isfinite(cov).all(axis=(1, 2))
+    finite = (np.abs(cov) < _UNKNOWN_VARIANCE).all(axis=(1, 2))
     negative = finite & (diagonal < 0).any(axis=1)
     zero = finite & ~negative & (diagonal == 0).any(axis=1)
     known = finite & ~negative & ~zero
@@ -54,9 +56,7 @@ def screen_positions(screening: Screening, rows: Rows, min_rank: int = 0) -> Non
         screening.reject(rank < min_rank, "status below min_status")
     without = np.isnan(lla).all(axis=1)
     screening.reject(~np.isfinite(lla).all(axis=1) & ~(without & np.isfinite(vel).all(axis=1)), "not finite")
-    screening.reject(
-        ~without & ((np.abs(lla[:, 0]) > np.pi / 2) | (np.abs(lla[:, 1]) > 2 * np.pi)), "no such latitude or longitude"
-    )
+    screening.reject(~without & (np.abs(lla) > _FARTHEST).any(axis=1), "no such position")
     screening.reject((lla[:, 0] == 0) & (lla[:, 1] == 0), "position 0, 0")
 
 

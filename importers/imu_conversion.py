@@ -12,6 +12,7 @@ from navreplay.timeline import ChannelUse, Floats, ImuSeries, LogError
 __all__ = ["axes_matrix", "convert_imu"]
 
 _STANDARD_GRAVITY = 9.80665
+_BEYOND_ANY_SENSOR = 1e6
 _G_RANGE = (0.5, 1.5)
 _DEGREES_MEDIAN = 1.0
 _DEGREES_PEAK = 20.0
@@ -31,7 +32,9 @@ def convert_imu(joined: Joined, settings: ImuInput) -> tuple[ImuSeries, tuple[Ch
     if rows.gyro is None or rows.accel is None:
         raise LogError(f"{joined.name}: has no angular rates or no specific forces, so it cannot serve as IMU")
     screening = Screening(joined.name, len(joined.t_ns))
-    screening.reject(~(np.isfinite(rows.gyro) & np.isfinite(rows.accel)).all(axis=1), "not finite")
+    samples = np.concatenate([rows.gyro, rows.accel], axis=1)
+    screening.reject(~np.isfinite(samples).all(axis=1), "not finite")
+    screening.reject((np.abs(samples) > _BEYOND_ANY_SENSOR).any(axis=1), "beyond any sensor")
     order = screening.order(joined.t_ns)
     if len(order) == 0:
         raise LogError(f"{joined.name}: none of its {len(joined.t_ns)} samples is usable: {screening.rejected(slice(None))}")

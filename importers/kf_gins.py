@@ -7,7 +7,7 @@ import numpy as np
 
 from importers.clock import unwrap_weeks
 from importers.log import Table
-from importers.rows import diagonal_covariance
+from importers.rows import diagonal_covariance, drop_absurd
 from importers.text_table import Selection, parse_text, read_bytes, select_columns
 from navreplay.time_scales import WEEK_S, gps_from_week_tow
 from navreplay.timeline import Floats
@@ -43,7 +43,7 @@ def read_imu(path: str, gps_week: int | None) -> Table:
     nominal = float(np.nanmedian(interval)) if len(values) > 1 else 1.0
     usual = (interval > 0) & (interval < _LONGEST_INCREMENT * nominal)
     rates = values[:, 1:] / np.where(usual, interval, nominal)[:, None]
-    return _table(path, selection, gps_week, {"gyro": rates[:, :3], "accel": rates[:, 3:]})
+    return _table(path, selection, gps_week, values[:, 0], {"gyro": rates[:, :3], "accel": rates[:, 3:]})
 
 
 def read_gnss(path: str, gps_week: int | None) -> Table:
@@ -54,7 +54,7 @@ def read_gnss(path: str, gps_week: int | None) -> Table:
     out = {"lla": values[:, 1:4] * [np.pi / 180, np.pi / 180, 1.0], "cov_pos": diagonal_covariance(values[:, 4:7])}
     if width == 13:
         out |= {"vel_n": values[:, 7:10], "cov_vel": diagonal_covariance(values[:, 10:13])}
-    return _table(path, selection, gps_week, out)
+    return _table(path, selection, gps_week, values[:, 0], out)
 
 
 def _read(path: str, width: int) -> Selection:
@@ -63,10 +63,13 @@ def _read(path: str, width: int) -> Selection:
 
 
 def _values(selection: Selection, width: int) -> Floats:
-    return np.column_stack([selection.columns[str(i)] for i in range(width)]).astype(np.float64)
+    """The rows (n, width) that have a time."""
+    values = np.column_stack([selection.columns[str(i)] for i in range(width)]).astype(np.float64)
+    return drop_absurd(values[(values[:, 0] >= 0) & (values[:, 0] < WEEK_S)])
 
 
-def _table(path: str, selection: Selection, gps_week: int | None, columns: dict[str, np.ndarray]) -> Table:
-    tow_s = selection.columns["0"].astype(np.float64)
+def _table(path: str, selection: Selection, gps_week: int | None, tow_s: Floats, columns: dict[str, np.ndarray]) -> Table:
     t_ns = gps_from_week_tow(unwrap_weeks(gps_week, tow_s, path), tow_s)
-    return Table(t_ns, columns | {"t_gps_ns": t_ns}, selection.read, selection.rejected)
+    untimed = len(selection.columns["0"]) - len(tow_s)
+    rejected = dict(selection.rejected) | ({"no time": untimed} if untimed else {})
+    return Table(t_ns, columns | {"t_gps_ns": t_ns}, selection.read, rejected)

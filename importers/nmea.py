@@ -52,7 +52,7 @@ def read_nmea(path: str, utc_date: date | None, leap: LeapSeconds) -> Table:
     if len(gga) == 0:
         raise LogError(f"{path}: no intact GGA sentence among {len(starts)} lines; only GGA holds positions with heights")
     seconds = _seconds_of_day(gga["time"].to_numpy())
-    timed = np.isfinite(seconds)
+    timed = (seconds >= 0) & (seconds <= _DAY_S)
     gga, seconds = gga[timed], seconds[timed]
     day = _date_rows(path, gga.index.to_numpy(), seconds, rmc, utc_date)
     t_ns = gps_from_utc(day * _DAY_S * 10**9 + np.rint(seconds * 1e6).astype(np.int64) * 1000, leap)

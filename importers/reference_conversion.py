@@ -3,7 +3,7 @@
 import numpy as np
 
 from importers.fix_conversion import clean_covariance, screen_positions
-from importers.rows import Rows
+from importers.rows import Rows, drop_absurd
 from importers.screening import Screening
 from importers.settings import AttitudeInput, ReferenceInput
 from importers.sources import Joined, account
@@ -14,6 +14,7 @@ from navreplay.timeline import AttitudeSeries, ChannelUse, FixStatus, Floats, Gn
 
 __all__ = ["convert_attitude", "convert_reference", "reference_from_fixes"]
 
+_NEAR_UNIT = 0.1
 _NED_OF_ENU = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 
 
@@ -70,9 +71,10 @@ def convert_attitude(joined: Joined, settings: AttitudeInput) -> tuple[AttitudeS
 def _attitude(rows: Rows, convention: str) -> Floats:
     """q_nb (n, 4) of unit length, NaN where the log has none."""
     assert rows.q is not None
-    norm = np.linalg.norm(rows.q, axis=1, keepdims=True)
-    usable = np.isfinite(norm) & (np.abs(norm - 1) < 0.1)
-    q = np.where(usable, rows.q / np.where(usable, norm, 1.0), np.nan)
+    q = drop_absurd(rows.q)
+    norm = np.linalg.norm(q, axis=1, keepdims=True)
+    usable = np.abs(norm - 1) < _NEAR_UNIT
+    q = np.where(usable, q / np.where(usable, norm, 1.0), np.nan)
     return frd_ned_from_flu_enu(q) if rows.ros_attitude and convention == "ros" else q
 
 
@@ -87,7 +89,7 @@ def _place(joined: Joined, settings: ReferenceInput) -> Floats:
         )
     origin = np.array(settings.origin_deg_m) * [np.pi / 180, np.pi / 180, 1.0]
     to_earth = matrix_en(origin[0], origin[1]) @ _NED_OF_ENU
-    return lla_from_ecef(ecef_from_lla(origin) + joined.rows.local @ to_earth.T)
+    return lla_from_ecef(ecef_from_lla(origin) + drop_absurd(joined.rows.local) @ to_earth.T)
 
 
 def _status_code(name: str) -> int:

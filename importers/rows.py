@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 
 from navreplay.timeline import Floats
 
-__all__ = ["NO_FIX", "Frame", "Rows", "diagonal_covariance", "status_codes"]
+__all__ = ["NO_FIX", "Frame", "Rows", "diagonal_covariance", "drop_absurd", "status_codes"]
 
 NO_FIX = -1
 """Status of a row without a fix; others are of FixStatus."""
+
+_ABSURD = 1e9
 
 Frame = Literal["auto", "ned", "enu", "ecef"]
 
@@ -44,9 +46,16 @@ class Rows:
     ros_attitude: bool = False
 
 
+def drop_absurd(values: Floats) -> Floats:
+    """Values (...) with NaN in place of those beyond 1e9, which no position, velocity or accuracy reaches and whose squares
+    overflow."""
+    return np.where(np.abs(values) < _ABSURD, values, np.nan)
+
+
 def diagonal_covariance(std: Floats) -> Floats:
     """Covariances (n, 3, 3) of standard deviations (n, 3); all NaN where one of them is NaN or zero (zero means unknown)."""
-    known = (np.isfinite(std) & (std > 0)).all(axis=1)
+    std = drop_absurd(std)
+    known = (std > 0).all(axis=1)
     cov = np.zeros((len(std), 3, 3))
     cov[:, range(3), range(3)] = std**2
     cov[~known] = np.nan

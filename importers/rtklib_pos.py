@@ -8,16 +8,17 @@ import pandas as pd
 
 from importers.clock import gps_from_gps_unix
 from importers.log import Table
-from importers.rows import NO_FIX, status_codes
+from importers.rows import NO_FIX, drop_absurd, status_codes
 from importers.text_table import Selection, parse_text, read_bytes, select_columns
 from navreplay.earth import lla_from_ecef, matrix_en
-from navreplay.time_scales import LeapSeconds, gps_from_utc, gps_from_week_tow
+from navreplay.time_scales import WEEK_S, LeapSeconds, gps_from_utc, gps_from_week_tow
 from navreplay.timeline import FixStatus, Floats, LogError, Times
 
 __all__ = ["is_pos", "read_pos"]
 
 _GEODETIC = ("latitude(deg)", "longitude(deg)", "height(m)")
 _EARTH_FIXED = ("x-ecef(m)", "y-ecef(m)", "z-ecef(m)")
+_LAST_WEEK = 10_000
 _JAPAN_NS = 9 * 3600 * 10**9
 _STATUS = {
     "0": NO_FIX,
@@ -73,7 +74,7 @@ def _read_names(path: str, data: bytes) -> list[str]:
 def _read_times(selection: Selection, scale: str, dated: bool, leap: LeapSeconds) -> tuple[Times, np.ndarray]:
     first, second = selection.columns["first"], selection.columns["second"]
     if not dated:
-        timed = np.isfinite(first.astype(np.float64)) & np.isfinite(second.astype(np.float64))
+        timed = (first >= 0) & (first < _LAST_WEEK) & (second >= 0) & (second < WEEK_S)
         t_ns = gps_from_week_tow(first[timed].astype(np.int64), second[timed])
         return t_ns, timed
     joined = pd.Series(first) + " " + pd.Series(second)
@@ -107,7 +108,7 @@ def _build_columns(columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def _stack(columns: dict[str, np.ndarray], names: tuple[str, ...]) -> Floats:
-    return np.column_stack([columns[name] for name in names]).astype(np.float64)
+    return drop_absurd(np.column_stack([columns[name] for name in names]).astype(np.float64))
 
 
 def _covariance(deviations: Floats) -> Floats:

@@ -18,6 +18,7 @@ from navreplay.timeline import LogError
 __all__ = ["Selection", "TextTable", "parse_text", "read_bytes", "select_columns"]
 
 _NEWLINE = 10
+_LAST_BLANK = 32
 # From pandas 3.1 on, numbers are always rounded correctly and the option is deprecated.
 _EXACT_FLOATS = {} if tuple(map(int, pd.__version__.split(".")[:2])) >= (3, 1) else {"float_precision": "round_trip"}
 _HEAD_LINES = 50
@@ -69,7 +70,8 @@ def parse_text(
 
     A line with another number of fields than most, or with zero bytes in it, is rejected.
     """
-    buffer = np.frombuffer(data.replace(b'"', b""), dtype=np.uint8)
+    data = data.replace(b'"', b"").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    buffer = np.frombuffer(data, dtype=np.uint8)
     starts, ends = _split_lines(buffer, skip_rows, comment)
     head = [bytes(buffer[s:e]).decode(errors="replace") for s, e in zip(starts[:_HEAD_LINES], ends[:_HEAD_LINES], strict=True)]
     if delimiter == "auto":
@@ -114,7 +116,7 @@ def select_columns(
     kept = frame[~bad] if bad.any() else frame
     columns = {name: _to_numbers(kept[index], name in integers) for name, index in numbers.items()}
     for name, index in (texts or {}).items():
-        columns[name] = kept[index].astype(str).to_numpy(dtype=object)
+        columns[name] = kept[index].astype(object).where(kept[index].notna(), "").astype(str).to_numpy(dtype=object)
     rejected = dict(table.rejected)
     if bad.any():
         rejected["not a number"] = int(bad.sum())
@@ -143,14 +145,13 @@ def _split_lines(buffer: NDArray[np.uint8], skip_rows: int, comment: str | None)
     newlines = np.flatnonzero(buffer == _NEWLINE)
     starts = np.concatenate([[0], newlines + 1])[skip_rows:]
     ends = np.concatenate([newlines, [len(buffer)]])[skip_rows:]
-    ink = np.flatnonzero(buffer > 32)
-    keep = _count_marks(ink, starts, ends) > 0
-    starts, ends = starts[keep], ends[keep]
-    if comment is not None and len(starts):
-        first_ink = ink[np.searchsorted(ink, starts)]
-        keep = buffer[first_ink] != ord(comment)
-        starts, ends = starts[keep], ends[keep]
-    return starts, ends
+    starts, ends = starts[starts < len(buffer)], ends[starts < len(buffer)]
+    if len(starts) == 0:
+        return starts, ends
+    keep = np.maximum.reduceat(buffer, starts) > _LAST_BLANK
+    if comment is not None:
+        keep &= buffer[starts] != ord(comment)
+    return starts[keep], ends[keep]
 
 
 def _count_marks(marks: np.ndarray, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
@@ -176,14 +177,16 @@ def _looks_like_header(line: str, delimiter: str) -> bool:
 
 def _count_fields(buffer: NDArray[np.uint8], starts: np.ndarray, ends: np.ndarray, delimiter: str) -> np.ndarray:
     if delimiter == " ":
-        ink = buffer > 32
+        ink = (buffer != ord(" ")) & (buffer != ord("\t")) & (buffer != _NEWLINE)
         firsts = np.flatnonzero(ink & np.concatenate([[True], ~ink[:-1]]))
         return _count_marks(firsts, starts, ends)
     return _count_marks(np.flatnonzero(buffer == ord(delimiter)), starts, ends) + 1
 
 
 def _join_lines(buffer: NDArray[np.uint8], starts: np.ndarray, ends: np.ndarray) -> bytes:
-    """The lines as one text; without a copy per line."""
+    """The lines as one text, without a copy per line."""
+    if len(starts) == 0 or (ends[:-1] + 1 == starts[1:]).all():
+        return bytes(buffer[starts[0] : ends[-1]]) if len(starts) else b""
     edges = np.zeros(len(buffer) + 2, dtype=np.int8)
     edges[starts] += 1
     edges[np.minimum(ends + 1, len(buffer) + 1)] -= 1

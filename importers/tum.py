@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from importers.clock import count_ns
+from importers.clock import count_ns, is_time
 from importers.log import Table
+from importers.rows import drop_absurd
 from importers.text_table import parse_text, read_bytes, select_columns
 from navreplay.timeline import LogError
 
@@ -27,8 +28,9 @@ def read_tum(path: str) -> Table:
         raise LogError(f"{path}: a TUM trajectory has 8 columns, this file {text.frame.shape[1]}")
     selection = select_columns(text, {str(i): i for i in range(8)})
     values = np.column_stack([selection.columns[str(i)] for i in range(8)]).astype(np.float64)
-    timed = np.isfinite(values[:, 0])
+    timed = is_time(values[:, 0])
     rejected = dict(selection.rejected) | ({} if timed.all() else {"no time": int((~timed).sum())})
     stamps = count_ns(values[timed, 0], "s")
-    columns = {"stamp": stamps, "local": values[timed, 1:4], "q": values[timed][:, [7, 4, 5, 6]]}
+    values = drop_absurd(values[timed])
+    columns = {"stamp": stamps, "local": values[:, 1:4], "q": values[:, [7, 4, 5, 6]]}
     return Table(stamps, columns, selection.read, rejected)

@@ -187,7 +187,7 @@ def test_impossible_positions_are_rejected(tmp_path):
     latitude, longitude = np.full(10, 40.0), np.full(10, -105.0)
     latitude[0], latitude[1], longitude[1] = 91.0, 0.0, 0.0
     timeline = load_tables(tmp_path, {"/fix": (FIX, fix_table(latitude=latitude, longitude=longitude))})
-    assert dict(uses(timeline)["/fix"].rejected) == {"no such latitude or longitude": 1, "position 0, 0": 1}
+    assert dict(uses(timeline)["/fix"].rejected) == {"no such position": 1, "position 0, 0": 1}
 
 
 def test_heights_above_mean_sea_level(tmp_path):
