@@ -13,7 +13,7 @@ from importers.ros_definitions import RosType
 __all__ = ["RosDecoder"]
 
 _MAX_LAYOUTS = 16
-_ZSTD_MAGIC = 0xFD2FB528
+_ZSTD_MAGIC = bytes.fromhex("28b52ffd")
 
 
 class RosDecoder:
@@ -101,18 +101,14 @@ def _in_order(pieces: list[tuple[NDArray[np.intp], Columns]]) -> tuple[Columns, 
 
 
 def _expand(buffer: Buffer, start: Offsets, stop: Offsets) -> tuple[Buffer, Offsets, Offsets]:
-    """Messages that rosbag2 compressed one by one, decompressed; a CDR header never looks like a zstd frame."""
-    compressed = stop - start >= 4
-    places = start[compressed][:, np.newaxis] + np.arange(4)
-    compressed[compressed] = buffer[places].view("<u4")[:, 0] == _ZSTD_MAGIC
-    if not compressed.any():
+    """Messages that rosbag2 compressed one by one, decompressed; a CDR message begins with 0, never as a zstd frame does."""
+    if not (buffer[start[stop > start]] == _ZSTD_MAGIC[0]).any():
         return buffer, start, stop
-    messages = [
-        _decompress(buffer[a:b].tobytes()) if packed else buffer[a:b].tobytes()
-        for a, b, packed in zip(start, stop, compressed, strict=True)
-    ]
-    ends = np.cumsum([len(message) for message in messages])
-    return np.frombuffer(b"".join(messages), dtype=np.uint8), ends - [len(message) for message in messages], ends
+    messages = [buffer[a:b].tobytes() for a, b in zip(start, stop, strict=True)]
+    messages = [_decompress(message) if message.startswith(_ZSTD_MAGIC) else message for message in messages]
+    lengths = np.array([len(message) for message in messages], dtype=np.int64)
+    ends = np.cumsum(lengths)
+    return np.frombuffer(b"".join(messages), dtype=np.uint8), ends - lengths, ends
 
 
 def _decompress(frame: bytes) -> bytes:

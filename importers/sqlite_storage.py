@@ -110,22 +110,22 @@ class SqliteStorage:
         marks = ",".join("?" * len(wanted))
         query = f"SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({marks}) ORDER BY id"
         with closing(self._connect()) as database:
-            rows = _rows(database, query, tuple(wanted))
-            block = _block_of(rows, self._note)
+            cursor = database.cursor()
+            try:
+                cursor.execute(query, tuple(wanted))
+            except sqlite3.DatabaseError as error:
+                self._note(f"no message can be read ({error}); the file is damaged")
+            block = _block_of(cursor, self._note)
             while block:
                 yield block
-                block = _block_of(rows, self._note)
+                block = _block_of(cursor, self._note)
 
 
-def _rows(database: sqlite3.Connection, query: str, values: tuple[int, ...]) -> Iterator[tuple[object, object, object]]:
-    yield from database.execute(query, values)
-
-
-def _block_of(rows: Iterator[tuple[object, object, object]], note: Callable[[str], None]) -> Block | None:
+def _block_of(cursor: sqlite3.Cursor, note: Callable[[str], None]) -> Block | None:
     """The next few thousand rows (topic, time, message); None at the end, and behind damage."""
     topics, times, stops, buffer = [], [], [0], bytearray()
     try:
-        for topic, time, message in islice(rows, _BLOCK_MESSAGES):
+        for topic, time, message in islice(cursor, _BLOCK_MESSAGES):
             # A damaged row may hold anything; that it is lost shows in the balance with the count.
             if isinstance(time, int) and isinstance(message, bytes):
                 buffer += message
@@ -137,5 +137,5 @@ def _block_of(rows: Iterator[tuple[object, object, object]], note: Callable[[str
     if not times:
         return None
     limits = np.array(stops, dtype=np.int64)
-    content = np.frombuffer(bytes(buffer), dtype=np.uint8)
+    content = np.frombuffer(buffer, dtype=np.uint8)
     return Block(content, np.array(topics, dtype=np.int64), np.array(times, dtype=np.int64), limits[:-1], limits[1:])
