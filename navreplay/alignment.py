@@ -79,17 +79,23 @@ def _align_at_rest(sources: Sources, first: int, still_until: int, moving: np.nd
     roll, pitch = level(imu.accel[still].mean(axis=0))
     t_ns, lla = int(sources.fixes.t_ns[first]), sources.fixes.lla[first]
     mean_std = float(np.hypot(noise.gyro_noise / np.sqrt(seconds), noise.gyro_bias_walk * np.sqrt(seconds)))
-    # until heading is known, the Earth's rotation cannot be told from a bias
-    learnt_std = float(np.hypot(mean_std, earth.EARTH_RATE))
-    learns = learnt_std < noise.gyro_bias_std
-    bias, bias_std = (gyro, learnt_std) if learns else (np.zeros(3), noise.gyro_bias_std)
+    c_level = rotation.matrix_from_euler(roll, pitch, 0.0)
+    # without heading, of the Earth's rotation only the part about the vertical can be told from a bias
+    vertical = np.array([0.0, 0.0, earth.EARTH_RATE * -np.sin(lla[0])])
+    rough = gyro - c_level.T @ vertical
 
     heading = known_heading(sources, t_ns)
     if heading is None and options.method in ("auto", "gyrocompass"):
         heading = gyrocompass(sources, gyro, mean_std, roll, pitch, float(lla[0]))
     if heading is None:
-        start = replace(NavState.at(lla, np.zeros(3), rotation.quat_from_euler(roll, pitch, 0.0)), gyro_bias=bias)
-        heading = match_course(sources, start, t_ns, moving, bias_std * (still_until - t_ns) / 1e9)
+        start = replace(NavState.at(lla, np.zeros(3), rotation.quat_from_euler(roll, pitch, 0.0)), gyro_bias=rough)
+        drift = float(np.hypot(mean_std, earth.EARTH_RATE)) * (still_until - t_ns) / 1e9
+        heading = match_course(sources, start, t_ns, moving, drift)
+    bias, bias_std = np.zeros(3), noise.gyro_bias_std
+    learnt_std = float(np.hypot(mean_std, earth.EARTH_RATE * np.cos(lla[0]) * min(heading.std, 1.0)))
+    if learnt_std < noise.gyro_bias_std:
+        c_nb = rotation.matrix_from_euler(roll, pitch, heading.yaw)
+        bias, bias_std = gyro - c_nb.T @ earth.earth_rate_n(lla[0]), learnt_std
     q_nb, cov_att, levelled, angles = _attitude(sources, roll, pitch, float(_LEAST_LEVEL_STD), heading)
     return Alignment(
         *(t_ns, first, q_nb, cov_att, levelled, np.zeros(3), _VELOCITY_STD_AT_REST, bias, bias_std),

@@ -20,6 +20,7 @@ __all__ = [
     "ImuSeries",
     "LogError",
     "Provenance",
+    "RangeSeries",
     "SourceFile",
     "Timeline",
     "Trajectory",
@@ -152,6 +153,57 @@ class GnssFixSeries:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
+class RangeSeries:
+    """Pseudoranges and range rates of one receiver: a row per satellite signal and epoch, rows in the order of time.
+
+    t_ns: (n,) receive time, equal within an epoch. sat: (n,) such as ``G05`` (RINEX system letter and number). signal: (n,)
+    RINEX code such as ``1C``. pseudorange: (n,) [m], with satellite clock, relativity and group delay already added.
+    range_rate: (n,) [m/s], with the satellite's clock drift already added, NaN where unknown. pseudorange_std, range_rate_std,
+    cn0 [dB-Hz]: (n,), NaN where unknown. sat_pos_e: (n, 3) [m] of the satellite at transmission, in Earth-fixed axes of the
+    time of reception (turned for the signal's flight). sat_vel_e: (n, 3) [m/s] in the same axes.
+    ionosphere_removed, troposphere_removed: whether the pseudoranges are free of them already. klobuchar: (8,) broadcast
+    alpha0..3 and beta0..3, None where unknown.
+    Raises LogError unless times never fall and pseudoranges and satellite states are finite.
+    """
+
+    t_ns: Times
+    sat: NDArray[np.str_]
+    signal: NDArray[np.str_]
+    pseudorange: Floats
+    range_rate: Floats
+    pseudorange_std: Floats
+    range_rate_std: Floats
+    cn0: Floats
+    sat_pos_e: Floats
+    sat_vel_e: Floats
+    ionosphere_removed: bool = False
+    troposphere_removed: bool = False
+    klobuchar: Floats | None = None
+
+    def __post_init__(self) -> None:
+        n = len(self.t_ns)
+        if n == 0:
+            raise LogError("ranges: no samples")
+        falling = np.flatnonzero(np.diff(self.t_ns) < 0)
+        if len(falling):
+            raise LogError(f"ranges: time must not fall, but it does behind row {int(falling[0])}")
+        for column in ("sat", "signal", "pseudorange", "range_rate", "pseudorange_std", "range_rate_std", "cn0"):
+            _check_shape("ranges", column, getattr(self, column), (n,))
+        for column in ("sat_pos_e", "sat_vel_e"):
+            _check_shape("ranges", column, getattr(self, column), (n, 3))
+        for column in ("pseudorange", "sat_pos_e", "sat_vel_e"):
+            _check_finite("ranges", column, getattr(self, column))
+
+    def __len__(self) -> int:
+        return len(self.t_ns)
+
+    @property
+    def epoch_starts(self) -> NDArray[np.intp]:
+        """(k + 1,) index of each epoch's first row, and the number of rows."""
+        return np.concatenate([np.flatnonzero(np.diff(self.t_ns, prepend=self.t_ns[0] - 1)), [len(self)]])
+
+
+@dataclass(frozen=True, eq=False, slots=True)
 class AttitudeSeries:
     """Attitude measured by another sensor (dual antenna, AHRS, star tracker).
 
@@ -258,6 +310,7 @@ class Timeline:
 
     imu: ImuSeries | None = None
     fixes: GnssFixSeries | None = None
+    ranges: RangeSeries | None = None
     attitude: AttitudeSeries | None = None
     reference: Trajectory | None = None
     fix_lever_b: Floats = field(default_factory=lambda: np.zeros(3))
