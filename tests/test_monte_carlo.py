@@ -10,14 +10,17 @@ import synthetic_logs
 from navreplay import earth, rotation
 from navreplay.filters.presets import build_method
 from navreplay.filters.run import run_filter
-from navreplay.options import FilterOptions, GateOptions
+from navreplay.options import AlignmentOptions, FilterOptions, GateOptions
 
 BLOCKS = {"position": slice(0, 3), "velocity": slice(3, 6), "attitude": slice(6, 9)}
 
 
 def run_seeds(scenario: synthetic_logs.Scenario, seeds: range) -> tuple[np.ndarray, np.ndarray]:
     """Errors (seeds, k, 9) and covariances (seeds, k, 9, 9) at the rows that lie on the truth's epochs."""
-    options = FilterOptions(imu_noise=scenario.imu.noise, gate=GateOptions(probability=1.0), output_rate=1.0)
+    # these cars do not slip: their course is their heading but for the noise of the velocity
+    alignment = AlignmentOptions(course_std=np.radians(0.3))
+    gate = GateOptions(probability=1.0)
+    options = FilterOptions(imu_noise=scenario.imu.noise, alignment=alignment, gate=gate, output_rate=1.0)
     errors, covariances = [], []
     for seed in seeds:
         log = synthetic_logs.simulate(scenario, seed)
