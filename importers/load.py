@@ -89,7 +89,15 @@ def build_timeline(
     files = tuple(describe_file(log) for log in {log.path: log for log in logs}.values())
     provenance = Provenance(files, _complete(logs, uses), tuple(dict.fromkeys(notes)))
     levers = (np.array(settings.fix.lever_arm_m), _reference_lever(settings))
-    return Timeline(imu, fixes, attitude, trajectory, *levers, provenance)
+    return Timeline(
+        imu=imu,
+        fixes=fixes,
+        attitude=attitude,
+        reference=trajectory,
+        fix_lever_b=levers[0],
+        reference_lever_b=levers[1],
+        provenance=provenance,
+    )
 
 
 _GNSS = ("fix", "velocity")

@@ -300,7 +300,7 @@ class Provenance:
     assumptions: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False, slots=True, kw_only=True)
 class Timeline:
     """All series of a log on GPS time, converted to the program's conventions.
 

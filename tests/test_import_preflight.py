@@ -13,7 +13,7 @@ from navreplay.timeline import ImuSeries, LogError, Timeline
 from synthetic_logs import SCENARIOS, simulate, write
 
 DRIVE = simulate(SCENARIOS["car-short"], 3)
-LOG = Timeline(DRIVE.imu, DRIVE.fixes, None, DRIVE.truth)
+LOG = Timeline(imu=DRIVE.imu, fixes=DRIVE.fixes, reference=DRIVE.truth)
 
 
 def with_imu(**changed):
