@@ -88,14 +88,13 @@ def build_timeline(
         notes.append("the fixes themselves, before any is withheld, serve as the reference: not an independent one")
     files = tuple(describe_file(log) for log in {log.path: log for log in logs}.values())
     provenance = Provenance(files, _complete(logs, uses), tuple(dict.fromkeys(notes)))
-    levers = (np.array(settings.fix.lever_arm_m), _reference_lever(settings))
     return Timeline(
         imu=imu,
         fixes=fixes,
         attitude=attitude,
         reference=trajectory,
-        fix_lever_b=levers[0],
-        reference_lever_b=levers[1],
+        fix_lever_b=np.array(settings.fix.lever_arm_m),
+        reference_lever_b=_reference_lever(settings),
         provenance=provenance,
     )
 
