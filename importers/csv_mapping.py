@@ -5,8 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from scipy.io import loadmat
-from scipy.io.matlab import MatReadError
 
 from importers.clock import count_ns, gps_from_gps_unix, is_time, unwrap_weeks
 from importers.log import Table
@@ -78,6 +76,9 @@ def _read_lines(path: str, mapping: CsvMapping) -> TextTable:
 
 
 def _read_matrix(path: str, mapping: CsvMapping) -> TextTable:
+    from scipy.io import loadmat  # here, because few logs are MATLAB files and it takes a while to import
+    from scipy.io.matlab import MatReadError
+
     try:
         variables = loadmat(path)
     except (OSError, ValueError, MatReadError, NotImplementedError) as error:
