@@ -19,7 +19,8 @@ class ImuNoise:
     accel_bias_std [m/s^2] are turn-on uncertainties. gyro_bias_walk [rad/s/sqrt(s)] and accel_bias_walk [m/s^2/sqrt(s)]
     drive the biases; with a finite gyro_bias_tau or accel_bias_tau [s] they are first-order Gauss-Markov, else random walks.
     gyro_scale_std and accel_scale_std are scale-factor uncertainties; where either is positive the filter estimates the
-    scale factors (21 states instead of 15).
+    scale factors (six states more). gyro_markov_std [rad/s], where positive, adds a stationary first-order Gauss-Markov error
+    with time constant gyro_markov_tau [s] to the gyro bias (three states more).
     """
 
     gyro_noise: float
@@ -32,15 +33,18 @@ class ImuNoise:
     accel_bias_tau: float = inf
     gyro_scale_std: float = 0.0
     accel_scale_std: float = 0.0
+    gyro_markov_std: float = 0.0
+    gyro_markov_tau: float = 300.0
 
 
 GRADES: dict[str, ImuNoise] = {
-    "consumer": ImuNoise(0.01 * _DEG, 2.0e-3, 0.5 * _DEG, 30 * _MG, 5e-4 * _DEG, 1e-4 * 9.8 / 10),
-    "industrial": ImuNoise(0.004 * _DEG, 8.0e-4, 0.15 * _DEG, 8 * _MG, 1e-4 * _DEG, 3e-5),
-    "tactical": ImuNoise(0.1 * _DEG / 60, 3.0e-4, 5 * _DPH, 1.5 * _MG, 0.1 * _DPH, 5e-6),
-    "navigation": ImuNoise(0.003 * _DEG / 60, 5.0e-5, 0.02 * _DPH, 0.05 * _MG, 2e-4 * _DPH, 2e-7),
+    "consumer": ImuNoise(0.2 * _DEG, 0.07, 0.5 * _DEG, 30 * _MG, 2e-3 * _DEG, 1e-3),
+    "industrial": ImuNoise(0.03 * _DEG, 0.03, 0.15 * _DEG, 15 * _MG, 1e-3 * _DEG, 1e-3),
+    "tactical": ImuNoise(0.3 * _DEG / 60, 5e-3, 5 * _DPH, 2 * _MG, 0.3 * _DPH, 5e-5),
+    "navigation": ImuNoise(0.005 * _DEG / 60, 5e-4, 0.02 * _DPH, 0.1 * _MG, 1e-3 * _DPH, 2e-6),
 }
-"""Typical figures by grade, with room for vibration; a data sheet or a static log gives better ones."""
+"""Noise by grade as a filter must expect it in a vehicle: vibration, time jitter and what the error model leaves out (scale
+factors, misalignment) make it several times a data sheet's, the more so the cheaper the sensor."""
 
 
 @dataclass(frozen=True, slots=True)

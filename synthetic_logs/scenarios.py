@@ -3,7 +3,7 @@
 from dataclasses import replace
 from math import pi
 
-from navreplay.options import GRADES
+from navreplay.options import ImuNoise
 from navreplay.timeline import FixStatus
 from synthetic_logs.gnss import GnssErrors
 from synthetic_logs.imu_errors import ImuErrors
@@ -13,6 +13,8 @@ from synthetic_logs.simulation import Journey, Scenario
 __all__ = ["SCENARIOS"]
 
 _DEG = pi / 180
+_DPH = _DEG / 3600
+_MG = 9.80665e-3
 
 
 def _place(lat_deg: float, lon_deg: float, height: float) -> tuple[float, float, float]:
@@ -111,10 +113,15 @@ _UAV_FIXES = GnssErrors((5.0, 5.0, 8.0), (0.05, 0.05, 0.05))
 _CAR_LEVER = (-0.4, 0.3, -1.2)
 _UAV_LEVER = (0.2, 0.0, -0.3)
 
-_CONSUMER = ImuErrors(GRADES["consumer"], gyro_quantum=0.0076 * _DEG, accel_quantum=0.0012)
-_INDUSTRIAL = ImuErrors(GRADES["industrial"])
-_TACTICAL = ImuErrors(GRADES["tactical"])
-_NAVIGATION = ImuErrors(GRADES["navigation"])
+# as data sheets have them: no vibration, no scale factors
+_CONSUMER_NOISE = ImuNoise(0.01 * _DEG, 2e-3, 0.5 * _DEG, 30 * _MG, 5e-4 * _DEG, 1e-4)
+_INDUSTRIAL_NOISE = ImuNoise(0.004 * _DEG, 8e-4, 0.15 * _DEG, 8 * _MG, 1e-4 * _DEG, 3e-5)
+_TACTICAL_NOISE = ImuNoise(0.1 * _DEG / 60, 3e-4, 5 * _DPH, 1.5 * _MG, 0.1 * _DPH, 5e-6)
+_NAVIGATION_NOISE = ImuNoise(0.003 * _DEG / 60, 5e-5, 0.02 * _DPH, 0.05 * _MG, 2e-4 * _DPH, 2e-7)
+_CONSUMER = ImuErrors(_CONSUMER_NOISE, gyro_quantum=0.0076 * _DEG, accel_quantum=0.0012)
+_INDUSTRIAL = ImuErrors(_INDUSTRIAL_NOISE)
+_TACTICAL = ImuErrors(_TACTICAL_NOISE)
+_NAVIGATION = ImuErrors(_NAVIGATION_NOISE)
 
 _CAR_JOURNEY = Journey(_CITY, 600.0, lever_b=_CAR_LEVER)
 _UAV_JOURNEY = Journey(_UAV, 600.0, increments=True, lever_b=_UAV_LEVER)
