@@ -1,10 +1,11 @@
 """IMU-rate work, compiled: arrays in, arrays out. `.py_func` of each kernel is its reference in tests.
 
-Packed state x (22): lat, lon [rad], height [m], v_N, v_E, v_D [m/s], q_nb (4), gyro bias (3) [rad/s], accelerometer bias (3)
-[m/s^2], gyro scale (3), accelerometer scale (3). Error state (15 or 21), true minus computed: position NED [m], velocity NED
-[m/s], rotation vector phi in n with C_nb true = (I + [phi x]) C_nb computed, gyro bias, accelerometer bias (, gyro scale,
-accelerometer scale). Error equations: Groves, Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems,
-2nd ed. (2013), 14.2.4, with this sign of phi and position in metres.
+Packed state x (25 or longer): lat, lon [rad], height [m], v_N, v_E, v_D [m/s], q_nb (4), gyro bias (3) [rad/s], accelerometer
+bias (3) [m/s^2], gyro scale (3), accelerometer scale (3), Gauss-Markov part of the gyro error (3) [rad/s]; what follows is
+carried along. Error state (15, 18, 21 or 24), true minus computed: position NED [m], velocity NED [m/s], rotation vector phi in
+n with C_nb true = (I + [phi x]) C_nb computed, gyro bias, accelerometer bias (, gyro scale, accelerometer scale) (,
+Gauss-Markov part of the gyro error). Error equations: Groves, Principles of GNSS, Inertial, and Multisensor Integrated
+Navigation Systems, 2nd ed. (2013), 14.2.4, with this sign of phi and position in metres.
 """
 
 import math
@@ -70,9 +71,9 @@ def _step(x, dt, dtheta, dvel, c, dv_n, body):
     the step's corrected rotation (3) and velocity increment (3), for the scale-factor columns."""
     lat, height = x[0], x[2]
     vn, ve, vd = x[3], x[4], x[5]
-    tx = (dtheta[0] - x[10] * dt) / (1 + x[16])
-    ty = (dtheta[1] - x[11] * dt) / (1 + x[17])
-    tz = (dtheta[2] - x[12] * dt) / (1 + x[18])
+    tx = (dtheta[0] - (x[10] + x[22]) * dt) / (1 + x[16])
+    ty = (dtheta[1] - (x[11] + x[23]) * dt) / (1 + x[17])
+    tz = (dtheta[2] - (x[12] + x[24]) * dt) / (1 + x[18])
     ux = (dvel[0] - x[13] * dt) / (1 + x[19])
     uy = (dvel[1] - x[14] * dt) / (1 + x[20])
     uz = (dvel[2] - x[15] * dt) / (1 + x[21])
@@ -127,7 +128,7 @@ def _step(x, dt, dtheta, dvel, c, dv_n, body):
 
 @njit(cache=True)
 def integrate(start, dt, dtheta, dvel, states):
-    """Mechanisation only: states (k, 22) at the ends of k steps, from start (22)."""
+    """Mechanisation only: states (k, w) at the ends of k steps, from start (w)."""
     x = start.copy()
     c = np.empty((3, 3))
     dv_n = np.empty(3)
@@ -214,9 +215,11 @@ def _fill_rate_matrix(x, span, c_dt, dv_n, c_theta, c_dvel, a):
         for j in range(3):
             a[6 + i, 9 + j] = -c_dt[i, j]
             a[3 + i, 12 + j] = -c_dt[i, j]
-            if n == 21:
+            if n >= 21:
                 a[6 + i, 15 + j] = -c_theta[i, j]
                 a[3 + i, 18 + j] = -c_dvel[i, j]
+            if n == 18 or n == 24:
+                a[6 + i, n - 3 + j] = -c_dt[i, j]
 
 
 @njit(cache=True)
@@ -288,10 +291,10 @@ def propagate(
 ):
     """Mechanisation and covariance over k nodes.
 
-    start (22), p_start (n, n): at the beginning. dt, dtheta, dvel, bridged: steps. ends (k): number of steps up to and with
+    start (w), p_start (n, n): at the beginning. dt, dtheta, dvel, bridged: steps. ends (k): number of steps up to and with
     each node, the first counted from 0; consecutive nodes share no step. density (n): white-noise densities. tau (n - 9):
     correlation times of the sensor errors, inf for random walks. interval [s]: longest covariance step; noise enters half
-    before and half after the transition (trapezoidal rule). Filled: states (k, 22), covariances (k, n, n) and, unless they
+    before and half after the transition (trapezoidal rule). Filled: states (k, w), covariances (k, n, n) and, unless they
     have no rows, transitions and noises (k, n, n) of the node's whole interval.
     """
     n = p_start.shape[0]
@@ -332,12 +335,15 @@ def propagate(
                 for j in range(3):
                     c_mean = 0.5 * (c_start[i, j] + c[i, j])
                     c_dt[i, j] += c_mean * h
-                    if n == 21:
+                    if n >= 21:
                         c_theta[i, j] += c_mean * body[j]
                         c_dvel[i, j] += c_mean * body[3 + j]
             if fading:
                 for i in range(6):
                     x[10 + i] *= math.exp(-h / tau[i])
+                if n == 18 or n == 24:
+                    for i in range(3):
+                        x[22 + i] *= math.exp(-h / tau[n - 12 + i])
             if bridged[step]:
                 bridge += h * h
             span += h

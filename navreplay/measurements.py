@@ -60,7 +60,7 @@ def _raise_diagonal(cov: Floats, least: float) -> Floats:
 
 def angular_rate(state: NavState, dtheta: Floats, dt: float) -> Floats:
     """Rate of the body against the Earth (3,) [rad/s], body axes, from one step's rotation (3,) and length [s]."""
-    inertial = (dtheta / dt - state.gyro_bias) / (1 + state.gyro_scale)
+    inertial = (dtheta / dt - state.gyro_error) / (1 + state.gyro_scale)
     return np.asarray(inertial - matrix_from_quat(state.q_nb).T @ earth.earth_rate_n(state.lla[0]))
 
 

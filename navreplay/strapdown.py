@@ -4,7 +4,7 @@ Corrections for coning and sculling follow Savage, Strapdown Inertial Navigation
 (JGCD 21 (1998) 19 and 208), with angular rate and specific force linear in time over two samples.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -47,7 +47,9 @@ class Steps:
 @dataclass(frozen=True, eq=False, slots=True)
 class NavState:
     """Position (3,) [rad, rad, m], velocity NED (3,) [m/s], attitude q_nb (4,), gyro bias (3,) [rad/s], accelerometer bias
-    (3,) [m/s^2], scale-factor errors (3,) of gyro and accelerometer [1]."""
+    (3,) [m/s^2], scale-factor errors (3,) of gyro and accelerometer [1], Gauss-Markov part of the gyro error (3,) [rad/s],
+    which adds to the gyro bias, and the receiver clock (c,): offsets [m] and, last, drift [m/s], empty without
+    ranges."""
 
     lla: Floats
     vel_n: Floats
@@ -56,6 +58,8 @@ class NavState:
     accel_bias: Floats
     gyro_scale: Floats
     accel_scale: Floats
+    gyro_markov: Floats = field(default_factory=lambda: np.zeros(3))
+    clock: Floats = field(default_factory=lambda: np.zeros(0))
 
     @classmethod
     def at(cls, lla: Floats, vel_n: Floats, q_nb: Floats) -> "NavState":
@@ -63,15 +67,19 @@ class NavState:
         return cls(lla, vel_n, q_nb, np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3))
 
     def pack(self) -> Floats:
-        """(22,) the layout of the kernels."""
-        return np.concatenate(
-            [self.lla, self.vel_n, self.q_nb, self.gyro_bias, self.accel_bias, self.gyro_scale, self.accel_scale]
-        )
+        """(25 + c,) the layout of the kernels, the clock behind it."""
+        sensors = [self.gyro_bias, self.accel_bias, self.gyro_scale, self.accel_scale, self.gyro_markov]
+        return np.concatenate([self.lla, self.vel_n, self.q_nb, *sensors, self.clock])
 
     @classmethod
     def unpack(cls, x: Floats) -> "NavState":
-        """The inverse of `pack`; x (22,)."""
-        return cls(x[0:3], x[3:6], x[6:10], x[10:13], x[13:16], x[16:19], x[19:22])
+        """The inverse of `pack`; x (25 + c,)."""
+        return cls(x[0:3], x[3:6], x[6:10], x[10:13], x[13:16], x[16:19], x[19:22], x[22:25], x[25:])
+
+    @property
+    def gyro_error(self) -> Floats:
+        """(3,) all that adds to the angular rate [rad/s]: bias and Gauss-Markov part."""
+        return self.gyro_bias + self.gyro_markov
 
 
 def find_gaps(t_ns: Times) -> NDArray[np.bool_]:
@@ -122,9 +130,10 @@ def _means_and_slopes(samples: Floats, dt: Floats, increments: bool, bridged: ND
 
 
 def integrate_steps(steps: Steps, start: NavState) -> Floats:
-    """(k, 22) packed states at the ends of the steps, from start at the beginning of the first."""
-    states = np.empty((len(steps), 22))
-    _kernels.integrate(start.pack(), steps.dt, steps.dtheta, steps.dvel, states)
+    """(k, w) packed states at the ends of the steps, from start at the beginning of the first."""
+    packed = start.pack()
+    states = np.empty((len(steps), len(packed)))
+    _kernels.integrate(packed, steps.dt, steps.dtheta, steps.dvel, states)
     return states
 
 

@@ -85,7 +85,7 @@ def test_kernel_equals_its_python_twin():
     imu = wandering_imu(21)
     steps = make_steps(imu, NO_CUTS)
     arguments = (start_state().pack(), steps.dt, steps.dtheta, steps.dvel)
-    fast, slow = np.empty((20, 22)), np.empty((20, 22))
+    fast, slow = np.empty((20, 25)), np.empty((20, 25))
     _kernels.integrate(*arguments, fast)
     _kernels.integrate.py_func(*arguments, slow)
     np.testing.assert_allclose(fast, slow, rtol=1e-13, atol=1e-13)
@@ -96,7 +96,7 @@ def run_propagate(imu, state, p, interval, nodes, keep=True, tau=None, density=N
     n, k = len(p), len(nodes)
     tau = np.full(n - 9, np.inf) if tau is None else tau
     density = np.zeros(n) if density is None else density
-    out = np.empty((k, 22)), np.empty((k, n, n)), np.empty((k if keep else 0, n, n)), np.empty((k if keep else 0, n, n))
+    out = np.empty((k, 25)), np.empty((k, n, n)), np.empty((k if keep else 0, n, n)), np.empty((k if keep else 0, n, n))
     _kernels.propagate(
         state.pack(), p, steps.dt, steps.dtheta, steps.dvel, steps.bridged, np.array(nodes), density, tau, interval, *out
     )
@@ -113,6 +113,7 @@ def disturbed(state: NavState, d: np.ndarray) -> NavState:
         state.accel_bias + d[12:15],
         state.gyro_scale + d[15:18],
         state.accel_scale + d[18:21],
+        state.gyro_markov + d[21:24],
     )
 
 
@@ -128,10 +129,10 @@ def test_transition_equals_finite_differences():
     state = start_state(vel_n=np.array([120.0, -70.0, 5.0]))
     steps = make_steps(imu, NO_CUTS)
     computed = integrate_steps(steps, state)[-1]
-    sizes = np.repeat([100.0, 0.1, 1e-4, 1e-4, 1e-2, 1e-3, 1e-3], 3)
-    phi = run_propagate(imu, state, np.eye(21), 0.01, [100])[2][0]
-    for i in range(21):
-        d = np.zeros(21)
+    sizes = np.repeat([100.0, 0.1, 1e-4, 1e-4, 1e-2, 1e-3, 1e-3, 1e-4], 3)
+    phi = run_propagate(imu, state, np.eye(24), 0.01, [100])[2][0]
+    for i in range(24):
+        d = np.zeros(24)
         d[i] = sizes[i]
         plus = difference(integrate_steps(steps, disturbed(state, d))[-1], computed)
         minus = difference(integrate_steps(steps, disturbed(state, -d))[-1], computed)

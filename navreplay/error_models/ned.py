@@ -1,6 +1,7 @@
-"""Error state in NED with 15 or, with scale factors, 21 elements: layout, noise, initial covariance, retraction, propagation.
+"""Error state in NED: 15 elements, with scale factors 6 more, with a Gauss-Markov gyro error 3 more.
 
-The equations themselves are in `navreplay._kernels`, which also states the sign of each element.
+Layout, noise, initial covariance, retraction and propagation. The equations themselves are in `navreplay._kernels`, which also
+states the sign of each element.
 """
 
 from dataclasses import dataclass
@@ -24,15 +25,16 @@ _GRAVITY = 9.81
 _NAMES = (
     *("position_n", "position_e", "position_d", "velocity_n", "velocity_e", "velocity_d"),
     *("attitude_n", "attitude_e", "attitude_d", "gyro_bias_x", "gyro_bias_y", "gyro_bias_z"),
-    *("accel_bias_x", "accel_bias_y", "accel_bias_z", "gyro_scale_x", "gyro_scale_y", "gyro_scale_z"),
-    *("accel_scale_x", "accel_scale_y", "accel_scale_z"),
+    *("accel_bias_x", "accel_bias_y", "accel_bias_z"),
 )
-_UNITS = tuple(unit for unit in ("m", "m/s", "rad", "rad/s", "m/s^2", "1", "1") for _ in range(3))
+_SCALE_NAMES = ("gyro_scale_x", "gyro_scale_y", "gyro_scale_z", "accel_scale_x", "accel_scale_y", "accel_scale_z")
+_MARKOV_NAMES = ("gyro_markov_x", "gyro_markov_y", "gyro_markov_z")
+_UNITS = tuple(unit for unit in ("m", "m/s", "rad", "rad/s", "m/s^2") for _ in range(3))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Propagated:
-    """States (k, 22) and covariances (k, n, n) at k nodes; transitions and noises (k, n, n) from the node before to each, or
+    """States (k, w) and covariances (k, n, n) at k nodes; transitions and noises (k, n, n) from the node before to each, or
     without rows where they were not asked for."""
 
     states: Floats
@@ -48,36 +50,45 @@ class NedErrorModel:
     noise: ImuNoise
 
     @property
+    def has_scale(self) -> bool:
+        """Whether scale factors are estimated."""
+        return self.noise.gyro_scale_std > 0 or self.noise.accel_scale_std > 0
+
+    @property
+    def has_markov(self) -> bool:
+        """Whether a Gauss-Markov gyro error is estimated beside the bias."""
+        return self.noise.gyro_markov_std > 0
+
+    @property
     def size(self) -> int:
-        """Number of error states n: 21 where scale factors are estimated, else 15."""
-        return 21 if self.noise.gyro_scale_std > 0 or self.noise.accel_scale_std > 0 else 15
+        """Number of error states n."""
+        return 15 + 6 * self.has_scale + 3 * self.has_markov
 
     @property
     def names(self) -> tuple[str, ...]:
         """(n,) names of the error states."""
-        return _NAMES[: self.size]
+        return _NAMES + _SCALE_NAMES * self.has_scale + _MARKOV_NAMES * self.has_markov
 
     @property
     def units(self) -> tuple[str, ...]:
         """(n,) units of the error states."""
-        return _UNITS[: self.size]
+        return _UNITS + ("1",) * 6 * self.has_scale + ("rad/s",) * 3 * self.has_markov
+
+    def _gather(self, base: list[float], scale: list[float], markov: float) -> Floats:
+        """Figures per axis of the states that exist, each repeated for three axes."""
+        return np.repeat(base + scale * self.has_scale + [markov] * self.has_markov, 3)
 
     def density(self) -> Floats:
         """(n,) densities of the driving white noise, in state units squared per second."""
-        per_axis = [
-            0.0,
-            self.noise.accel_noise,
-            self.noise.gyro_noise,
-            self.noise.gyro_bias_walk,
-            self.noise.accel_bias_walk,
-            0,
-            0,
-        ]
-        return np.repeat(np.square(per_axis), 3)[: self.size]
+        noise = self.noise
+        base = [0.0, noise.accel_noise, noise.gyro_noise, noise.gyro_bias_walk, noise.accel_bias_walk]
+        # a stationary Gauss-Markov error is driven by 2 sigma^2 / tau
+        return np.square(self._gather(base, [0.0, 0.0], noise.gyro_markov_std * np.sqrt(2 / noise.gyro_markov_tau)))
 
     def correlation_time(self) -> Floats:
         """(n - 9,) correlation times of the sensor errors [s]."""
-        return np.repeat([self.noise.gyro_bias_tau, self.noise.accel_bias_tau, np.inf, np.inf], 3)[: self.size - 9]
+        noise = self.noise
+        return self._gather([noise.gyro_bias_tau, noise.accel_bias_tau], [np.inf, np.inf], noise.gyro_markov_tau)
 
     def initial_covariance(self, cov_pos: Floats, cov_vel: Floats, cov_att: Floats, gyro_bias_std: float) -> Floats:
         """(n, n) from covariances (3, 3) of position [m^2], velocity [m^2/s^2] and attitude [rad^2] and the standard deviation
@@ -86,9 +97,10 @@ class NedErrorModel:
         cov[POSITION, POSITION] = cov_pos
         cov[VELOCITY, VELOCITY] = cov_vel
         cov[ATTITUDE, ATTITUDE] = cov_att
-        stds = [gyro_bias_std, self.noise.accel_bias_std, self.noise.gyro_scale_std, self.noise.accel_scale_std]
-        sensor = np.repeat(np.square(stds), 3)[: self.size - 9]
-        cov[range(9, self.size), range(9, self.size)] = sensor
+        noise = self.noise
+        scale = [noise.gyro_scale_std, noise.accel_scale_std]
+        sensor = self._gather([gyro_bias_std, noise.accel_bias_std], scale, noise.gyro_markov_std)
+        cov[range(9, self.size), range(9, self.size)] = np.square(sensor)
         return cov
 
     def tie_tilt_to_accel_bias(self, cov: Floats, q_nb: Floats) -> Floats:
@@ -104,8 +116,8 @@ class NedErrorModel:
 
     def retract(self, state: NavState, correction: Floats) -> NavState:
         """The state moved by an estimated error (n,), true minus computed."""
-        scales = np.zeros(6)
-        scales[: self.size - 15] = correction[15:]
+        scales = correction[15:21] if self.has_scale else np.zeros(6)
+        markov = correction[self.size - 3 : self.size] if self.has_markov else np.zeros(3)
         turn = rotation.quat_from_rotvec(correction[ATTITUDE])
         q_nb = rotation.quat_multiply(turn, state.q_nb)
         return NavState(
@@ -116,6 +128,7 @@ class NedErrorModel:
             state.accel_bias + correction[ACCEL_BIAS],
             state.gyro_scale + scales[:3],
             state.accel_scale + scales[3:],
+            state.gyro_markov + markov,
         )
 
     def propagate(
@@ -127,10 +140,11 @@ class NedErrorModel:
         """
         k, n = len(ends), self.size
         kept = k if keep else 0
-        out = Propagated(np.empty((k, 22)), np.empty((k, n, n)), np.empty((kept, n, n)), np.empty((kept, n, n)))
+        packed = state.pack()
+        out = Propagated(np.empty((k, len(packed))), np.empty((k, n, n)), np.empty((kept, n, n)), np.empty((kept, n, n)))
         part = slice(first, int(ends[-1]))
         _kernels.propagate(
-            state.pack(),
+            packed,
             cov,
             steps.dt[part],
             steps.dtheta[part],

@@ -27,7 +27,7 @@ Progress = Callable[[float], None]
 
 
 class _Rows(NamedTuple):
-    """Output of one stretch: t_ns (k,), packed states (k, 22), covariances (k, n, n), status (k,)."""
+    """Output of one stretch: t_ns (k,), packed states (k, w), covariances (k, n, n), status (k,)."""
 
     t_ns: Times
     states: Floats
@@ -76,7 +76,7 @@ def _join(rows: list[_Rows], method: Method, model: NedErrorModel, recorder: Rec
         lla=states[:, 0:3].copy(),
         vel_n=states[:, 3:6].copy(),
         q_nb=states[:, 6:10].copy(),
-        gyro_bias=states[:, 10:13].copy(),
+        gyro_bias=states[:, 10:13] + states[:, 22:25],
         accel_bias=states[:, 13:16].copy(),
         cov=np.concatenate([row.covariances for row in rows]),
         status=np.concatenate([row.status for row in rows]),
@@ -110,7 +110,7 @@ def _run_stretch(
     nodes = np.union1d(fixes.t_ns[epochs], _output_times(start.t_ns, int(imu.t_ns[-1]), options.output_rate))
     steps = make_steps(imu, np.append(nodes, start.t_ns)).after(start.t_ns)
     ends = np.searchsorted(steps.t_ns, nodes) + 1
-    rows = _allocate(np.concatenate([[start.t_ns], nodes]).astype(np.int64), model.size)
+    rows = _allocate(np.concatenate([[start.t_ns], nodes]).astype(np.int64), len(state.pack()), model.size)
     rows.states[0], rows.covariances[0], rows.status[0] = state.pack(), cov, RowStatus.UPDATED
 
     # each epoch ends a run of nodes; behind the last epoch one more run may follow, without a measurement
@@ -136,10 +136,10 @@ def _output_times(start_ns: int, end_ns: int, rate: float) -> Times:
     return np.arange((start_ns // period + 1) * period, end_ns + 1, period, dtype=np.int64)
 
 
-def _allocate(t_ns: Times, size: int) -> _Rows:
+def _allocate(t_ns: Times, width: int, size: int) -> _Rows:
     k = len(t_ns)
     status = np.full(k, RowStatus.PREDICTED, dtype=np.int8)
-    return _Rows(t_ns, np.empty((k, 22)), np.empty((k, size, size)), status)
+    return _Rows(t_ns, np.empty((k, width)), np.empty((k, size, size)), status)
 
 
 def _initial(
