@@ -38,8 +38,8 @@ class ImuNoise:
 
 
 GRADES: dict[str, ImuNoise] = {
-    "consumer": ImuNoise(0.2 * _DEG, 0.07, 0.5 * _DEG, 30 * _MG, 2e-3 * _DEG, 1e-3),
-    "industrial": ImuNoise(0.03 * _DEG, 0.03, 0.15 * _DEG, 15 * _MG, 1e-3 * _DEG, 1e-3),
+    "consumer": ImuNoise(0.2 * _DEG, 0.07, 0.5 * _DEG, 30 * _MG, 5e-4 * _DEG, 1e-3),
+    "industrial": ImuNoise(0.03 * _DEG, 0.03, 0.15 * _DEG, 15 * _MG, 2e-4 * _DEG, 1e-3),
     "tactical": ImuNoise(0.3 * _DEG / 60, 5e-3, 5 * _DPH, 2 * _MG, 0.3 * _DPH, 5e-5),
     "navigation": ImuNoise(0.005 * _DEG / 60, 5e-4, 0.02 * _DPH, 0.1 * _MG, 1e-3 * _DPH, 2e-6),
 }
