@@ -17,7 +17,7 @@ def show_progress(quiet: bool) -> Iterator[Progress | None]:
     from tqdm import tqdm
 
     bar_format = "{desc:<12}{percentage:3.0f}%|{bar}| {elapsed}"
-    with tqdm(total=1.0, bar_format=bar_format, delay=2, disable=None, leave=False) as bar:
+    with tqdm(total=1.0, bar_format=bar_format, delay=2, miniters=0, disable=None, leave=False) as bar:
 
         def tell(stage: str, fraction: float) -> None:
             bar.set_description_str(stage, refresh=False)
