@@ -28,8 +28,8 @@ class Table:
     """Messages of one channel as columns of equal length, in file order.
 
     log_time_ns: (n,) int64 receive time in the file's own base (UTC for ROS), or a copy of the stamps where a format has none.
-    columns: by field path. A scalar field is (n,), a fixed array (n, k). ROS and Foxglove conventions: ``header.stamp`` and every
-    time or duration an int64 column of nanoseconds; Vector3 and Point (n, 3); Quaternion (n, 4) in the order x, y, z, w;
+    columns: by field path. A scalar field is (n,), a fixed array (n, k). ROS and Foxglove conventions: ``header.stamp`` and
+    every time or duration an int64 column of nanoseconds; Vector3 and Point (n, 3); Quaternion (n, 4) in the order x, y, z, w;
     covariances (n, 9) or (n, 36) row-major; strings an object column. Nested fields keep their dots
     (``pose.pose.position``, ``twist.twist.linear``, ``status.status``).
     read: messages found in the file. rejected: messages that could not be decoded, count per reason; read = n + rejected.
