@@ -101,6 +101,8 @@ def match_course(sources: Sources, start: NavState, t_ns: int, moving: np.ndarra
         return unknown_heading(options)
     epochs = epochs[fixes.t_ns[epochs] <= fixes.t_ns[epochs[0]] + _SETTING_OFF_NS]
     at_rest = max(t_ns, int(fixes.t_ns[epochs[0]]) - _SETTING_OFF_NS)
+    last = int(np.searchsorted(imu.t_ns, fixes.t_ns[epochs[-1]])) + 1
+    imu = ImuSeries(imu.t_ns[:last], imu.gyro[:last], imu.accel[:last], imu.increments)
     steps = make_steps(imu, np.append(fixes.t_ns[epochs], [t_ns, at_rest])).after(t_ns)
     x = integrate_steps(steps, start)
     index = np.searchsorted(steps.t_ns, fixes.t_ns[epochs])

@@ -98,7 +98,8 @@ def make_steps(imu: ImuSeries, cut_ns: Times) -> Steps:
         raise LogError("imu: one sample is not enough to navigate")
     dt, dtheta, dvel, bridged = _interval_increments(imu)
     inside = cut_ns[(cut_ns > imu.t_ns[0]) & (cut_ns < imu.t_ns[-1])]
-    ends = np.unique(np.concatenate([imu.t_ns[1:], inside]))
+    ends = np.sort(np.concatenate([imu.t_ns[1:], inside]), kind="stable")
+    ends = ends[np.diff(ends, prepend=imu.t_ns[0]) > 0]
     interval = np.searchsorted(imu.t_ns[1:], ends)
     pieces = np.diff(ends, prepend=imu.t_ns[0]) / 1e9
     share = (pieces / dt[interval])[:, None]
@@ -111,9 +112,16 @@ def _interval_increments(imu: ImuSeries) -> tuple[Floats, Floats, Floats, NDArra
     gyro, gyro_slope = _means_and_slopes(imu.gyro, dt, imu.increments, bridged)
     accel, accel_slope = _means_and_slopes(imu.accel, dt, imu.increments, bridged)
     cube = (dt**3 / 12)[:, None]
-    coning = cube * np.cross(gyro, gyro_slope)
-    sculling = cube * (np.cross(gyro, accel_slope) - np.cross(gyro_slope, accel))
+    coning = cube * _cross(gyro, gyro_slope)
+    sculling = cube * (_cross(gyro, accel_slope) - _cross(gyro_slope, accel))
     return dt, gyro * dt[:, None] + coning, accel * dt[:, None] + sculling, bridged
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    """Row-wise cross product (n, 3); several times faster than numpy's, which serves every shape."""
+    ax, ay, az = a.T
+    bx, by, bz = b.T
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
 
 
 def _means_and_slopes(samples: Floats, dt: Floats, increments: bool, bridged: NDArray[np.bool_]) -> tuple[Floats, Floats]:

@@ -3,9 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg.lapack import dposv
 
-from navreplay.timeline import Floats
+from navreplay.timeline import Floats, LogError
 
 __all__ = ["Gaussian", "Innovation", "chi_square", "condition", "kalman_gain", "symmetric"]
 
@@ -32,7 +32,7 @@ class Innovation(NamedTuple):
 
     def select(self, rows: np.ndarray) -> "Innovation":
         """The components with index in rows (k,)."""
-        square = np.ix_(rows, rows)
+        square = rows[:, None], rows
         labels = tuple(self.labels[i] for i in rows)
         return Innovation(self.residual[rows], self.cross[:, rows], self.spread[square], self.noise[square], labels)
 
@@ -44,8 +44,7 @@ def symmetric(matrix: Floats) -> Floats:
 
 def kalman_gain(innovation: Innovation, noise: Floats) -> Floats:
     """Gain K (n, m) = cross S^-1 with S = spread + noise (m, m)."""
-    factor = cho_factor(innovation.spread + noise, lower=True, check_finite=False)
-    return np.asarray(cho_solve(factor, innovation.cross.T, check_finite=False).T)
+    return _solve(innovation.spread + noise, innovation.cross.T).T
 
 
 def condition(prior: Gaussian, innovation: Innovation, noise: Floats, gain: Floats | None = None) -> Gaussian:
@@ -63,4 +62,15 @@ def condition(prior: Gaussian, innovation: Innovation, noise: Floats, gain: Floa
 
 def chi_square(residual: Floats, cov: Floats) -> float:
     """residual' cov^-1 residual, of residual (m,) and cov (m, m)."""
-    return float(residual @ cho_solve(cho_factor(cov, lower=True, check_finite=False), residual, check_finite=False))
+    return float(residual @ _solve(cov, residual))
+
+
+def _solve(cov: Floats, right: Floats) -> Floats:
+    """cov^-1 right by Cholesky; the bare LAPACK call, whose wrappers would cost ten times the work at these sizes."""
+    _, solution, info = dposv(cov, right, lower=True)
+    if info != 0:
+        raise LogError(
+            "filter: the covariance of an innovation is not positive definite; are the standard deviations told plausible "
+            "(neither zero nor beyond all bounds)?"
+        )
+    return np.asarray(solution)

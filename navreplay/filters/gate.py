@@ -1,6 +1,7 @@
 """Innovation gate: each kind of an epoch's measurement is tested by itself, and a filter shut out too long is reopened."""
 
 from collections.abc import Iterator
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -27,9 +28,10 @@ class Verdict(NamedTuple):
     def parts(self, kinds: tuple[str, ...], innovation: Innovation, noise: Floats) -> Iterator[tuple[str, Judged]]:
         """Per kind, its components with the verdict on them."""
         for kind, rows in _rows_of(kinds).items():
-            yield kind, Judged(innovation.select(rows), noise[np.ix_(rows, rows)], self.nis[kind], self.reasons[kind])
+            yield kind, Judged(innovation.select(rows), noise[rows[:, None], rows], self.nis[kind], self.reasons[kind])
 
 
+@cache
 def _rows_of(kinds: tuple[str, ...]) -> dict[str, np.ndarray]:
     return {kind: np.array([i for i, k in enumerate(kinds) if k == kind]) for kind in dict.fromkeys(kinds)}
 
@@ -70,5 +72,5 @@ class Gate:
 
     @staticmethod
     def _square(innovation: Innovation, noise: Floats, rows: np.ndarray) -> float:
-        square = np.ix_(rows, rows)
+        square = rows[:, None], rows
         return chi_square(innovation.residual[rows], innovation.spread[square] + noise[square])

@@ -69,7 +69,7 @@ class FixUpdater:
             return state, cov, RowStatus.REJECTED
         if len(verdict.passed) < len(noise):
             innovation = innovation.select(verdict.passed)
-            noise = noise[np.ix_(verdict.passed, verdict.passed)]
+            noise = noise[verdict.passed[:, None], verdict.passed]
         posterior = condition(adapted, innovation, noise)
         return self._model.retract(state, posterior.mean), posterior.cov, RowStatus.UPDATED
 
