@@ -11,7 +11,7 @@ S = TypeVar("S")
 
 
 class Adaptation(NamedTuple, Generic[S]):
-    """prior: as given, or inflated. noise (m, m): the R to update with. state: for the next epoch of the same components."""
+    """prior: as given, or inflated. noise (m, m): the R to update with. state: for the next epoch."""
 
     prior: Gaussian
     noise: Floats
@@ -19,7 +19,8 @@ class Adaptation(NamedTuple, Generic[S]):
 
 
 class NoiseAdapter(Protocol[S]):
-    """An adapter keeps one state per set of measurement components (a log may give position alone now, with velocity then)."""
+    """What an adapter remembers of a component it keeps by the component's label: epochs differ in what they hold (position
+    alone now, with velocity then; satellites come and go)."""
 
     def init(self) -> S:
         """State before the first epoch."""

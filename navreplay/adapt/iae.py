@@ -10,6 +10,7 @@ Fails: when Q is wrong (the error goes into R), when noise changes faster than t
 the window for its whole length.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,27 +18,34 @@ import numpy as np
 from navreplay.adapt.adapter import Adaptation
 from navreplay.adapt.ratio import excess_ratio, scale_noise
 from navreplay.filters.core import Gaussian, Innovation
-from navreplay.timeline import Floats
 
-__all__ = ["Iae"]
+__all__ = ["Iae", "Windows"]
+
+Windows = Mapping[str, tuple[float, ...]]
+"""By label, the ratios of estimated to told variance of its last epochs."""
 
 
 @dataclass(frozen=True, slots=True)
 class Iae:
-    """window [epochs]: length; until it is full the told R holds. floor: least ratio of used to told variance."""
+    """window [epochs]: length; until a component's is full the told R holds for it. floor: least ratio of used to told
+    variance."""
 
     window: int = 30
     floor: float = 0.05
 
-    def init(self) -> Floats:
-        """Ratios of the window's epochs (k, m), none yet."""
-        return np.empty((0, 0))
+    def init(self) -> Windows:
+        """No windows yet."""
+        return {}
 
-    def adapt(self, state: Floats, prior: Gaussian, innovation: Innovation) -> Adaptation[Floats]:
-        """R scaled by the window's mean ratio."""
-        ratio = excess_ratio(innovation)[None]
-        ratios = np.concatenate([state, ratio])[-self.window :] if len(state) else ratio
-        if len(ratios) < self.window:
-            return Adaptation(prior, innovation.noise, ratios)
-        mean = np.maximum(ratios.mean(axis=0), self.floor)
-        return Adaptation(prior, scale_noise(innovation.noise, mean), ratios)
+    def adapt(self, state: Windows, prior: Gaussian, innovation: Innovation) -> Adaptation[Windows]:
+        """R scaled by the mean ratio of each component's window."""
+        ratio = excess_ratio(innovation).tolist()
+        pairs = zip(innovation.labels, ratio, strict=True)
+        windows = {label: (*state.get(label, ()), value)[-self.window :] for label, value in pairs}
+        full = [i for i, label in enumerate(innovation.labels) if len(windows[label]) == self.window]
+        if not full:
+            return Adaptation(prior, innovation.noise, {**state, **windows})
+        scale = np.ones(len(ratio))
+        history = np.array([windows[innovation.labels[i]] for i in full]).T
+        scale[full] = np.maximum(np.ascontiguousarray(history).mean(axis=0), self.floor)
+        return Adaptation(prior, scale_noise(innovation.noise, scale), {**state, **windows})

@@ -10,6 +10,7 @@ Fails: with Q wrong or P far from converged; the printed start (d_0 = 1) believe
 counts as `told_epochs` epochs.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -18,15 +19,14 @@ import numpy as np
 from navreplay.adapt.adapter import Adaptation
 from navreplay.adapt.ratio import excess_ratio, scale_noise
 from navreplay.filters.core import Gaussian, Innovation
-from navreplay.timeline import Floats
 
-__all__ = ["SageHusa", "SageHusaState"]
+__all__ = ["Fading", "SageHusa"]
 
 
-class SageHusaState(NamedTuple):
-    """ratio (m,) of estimated to told variance; epochs: how many stand behind it."""
+class Fading(NamedTuple):
+    """ratio of estimated to told variance; epochs: how many stand behind it."""
 
-    ratio: Floats
+    ratio: float
     epochs: int
 
 
@@ -38,12 +38,20 @@ class SageHusa:
     floor: float = 0.05
     told_epochs: int = 10
 
-    def init(self) -> SageHusaState:
-        """The told R."""
-        return SageHusaState(np.ones(1), self.told_epochs)
+    def init(self) -> Mapping[str, Fading]:
+        """The told R for every label."""
+        return {}
 
-    def adapt(self, state: SageHusaState, prior: Gaussian, innovation: Innovation) -> Adaptation[SageHusaState]:
-        """R scaled by the fading mean of the ratios, this epoch's included."""
-        weight = (1 - self.forgetting) / (1 - self.forgetting ** (state.epochs + 1))
-        ratio = np.maximum((1 - weight) * state.ratio + weight * excess_ratio(innovation), self.floor)
-        return Adaptation(prior, scale_noise(innovation.noise, ratio), SageHusaState(ratio, state.epochs + 1))
+    def adapt(self, state: Mapping[str, Fading], prior: Gaussian, innovation: Innovation) -> Adaptation[Mapping[str, Fading]]:
+        """R scaled by the fading mean of each component's ratios, this epoch's included."""
+        told = Fading(1.0, self.told_epochs)
+        before = [state.get(label, told) for label in innovation.labels]
+        weight = np.array([self._weigh(fading.epochs) for fading in before])
+        last = np.array([fading.ratio for fading in before])
+        ratio = np.maximum((1 - weight) * last + weight * excess_ratio(innovation), self.floor)
+        after = zip(innovation.labels, ratio.tolist(), before, strict=True)
+        fadings = {label: Fading(value, fading.epochs + 1) for label, value, fading in after}
+        return Adaptation(prior, scale_noise(innovation.noise, ratio), {**state, **fadings})
+
+    def _weigh(self, epochs: int) -> float:
+        return (1 - self.forgetting) / (1 - self.forgetting ** (epochs + 1))

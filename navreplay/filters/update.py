@@ -19,7 +19,7 @@ __all__ = ["FixUpdater"]
 
 
 class FixUpdater:
-    """Updates by GNSS fixes. Keeps one adapter state per set of components, the gate, and the record."""
+    """Updates by GNSS fixes. Keeps the state of the adapter, the gate, and the record."""
 
     def __init__(
         self,
@@ -40,7 +40,7 @@ class FixUpdater:
         self._has_position = fixes.has_position
         self._has_velocity = fixes.has_velocity & options.use_velocity
         self._gate = Gate(options.gate)
-        self._adapter_states: dict[tuple[str, ...], Any] = {}
+        self._adapter_state: Any = method.adapter.init()
         self._zero = np.zeros(model.size)
 
     def update(self, epoch: int, state: NavState, cov: Floats, dtheta: Floats, dt: float) -> tuple[NavState, Floats, RowStatus]:
@@ -52,9 +52,7 @@ class FixUpdater:
         rule, adapter = self._method.rule, self._method.adapter
         prior = Gaussian(self._zero, cov)
         innovation = rule.innovate(prior, measurement)
-        key = innovation.labels
-        adapter_state = self._adapter_states[key] if key in self._adapter_states else adapter.init()
-        adapted, noise, self._adapter_states[key] = adapter.adapt(adapter_state, prior, innovation)
+        adapted, noise, self._adapter_state = adapter.adapt(self._adapter_state, prior, innovation)
         if adapted is not prior:
             innovation = rule.innovate(adapted, measurement)
         verdict = self._gate.judge(measurement.kinds, innovation, noise)
