@@ -4,7 +4,16 @@ from dataclasses import dataclass, field
 from math import inf, pi
 from typing import Literal
 
-__all__ = ["GRADES", "AlignmentOptions", "FilterOptions", "GapOptions", "GateOptions", "ImuNoise"]
+__all__ = [
+    "GRADES",
+    "AlignmentOptions",
+    "FilterOptions",
+    "GapOptions",
+    "GateOptions",
+    "ImuNoise",
+    "MotionOptions",
+    "RangeOptions",
+]
 
 _DEG = pi / 180
 _DPH = _DEG / 3600
@@ -86,6 +95,47 @@ class GapOptions:
 
 
 @dataclass(frozen=True, slots=True)
+class RangeOptions:
+    """Pseudoranges, range rates, and the receiver clock.
+
+    Where the receiver reports no standard deviation that is positive, a measurement's is pseudorange_std [m] or range_rate_std
+    [m/s], which hold at the zenith and from cn0_reference [dB-Hz] up, divided by the sine of the elevation and multiplied by
+    10^((cn0_reference - C/N0) / 20) for a weaker signal. pseudorange_std_floor, range_rate_std_floor: least ones believed.
+    Not used: satellites below elevation_mask [rad], signals below cn0_mask [dB-Hz], and, where systems names any, satellites
+    of other systems than these RINEX letters. ionosphere, troposphere: correct for them what is not yet corrected.
+    clock_noise [m/sqrt(s)] and clock_drift_walk [m/s/sqrt(s)]: white noise of the receiver clock's frequency, and its random
+    walk. system_offset_std [m]: of another constellation's clock offset against the first's, before it is seen;
+    system_offset_walk [m/sqrt(s)]: its random walk. clock_jump [m]: a common jump of all pseudoranges beyond it is the clock's.
+    """
+
+    pseudorange_std: float = 1.5
+    range_rate_std: float = 0.05
+    pseudorange_std_floor: float = 0.3
+    range_rate_std_floor: float = 0.01
+    cn0_reference: float = 45.0
+    elevation_mask: float = 10 * _DEG
+    cn0_mask: float = 20.0
+    systems: str = ""
+    ionosphere: bool = True
+    troposphere: bool = True
+    clock_noise: float = 0.1
+    clock_drift_walk: float = 0.2
+    system_offset_std: float = 300.0
+    system_offset_walk: float = 0.01
+    clock_jump: float = 150.0
+
+
+@dataclass(frozen=True, slots=True)
+class MotionOptions:
+    """Motion of a receiver without IMU. model: ``velocity`` is constant but for white acceleration of density horizontal,
+    vertical [m/s^2/sqrt(Hz)]; or ``acceleration`` is, but for white jerk of these densities [m/s^3/sqrt(Hz)]."""
+
+    model: Literal["velocity", "acceleration"] = "velocity"
+    horizontal: float = 1.0
+    vertical: float = 0.3
+
+
+@dataclass(frozen=True, slots=True)
 class FilterOptions:
     """Everything a filter run is told beside the timeline and the method.
 
@@ -93,6 +143,7 @@ class FilterOptions:
     covariance propagation. use_velocity: take GNSS velocity where the log has it. noise_scale multiplies the standard
     deviations of all GNSS measurements. position_std_floor [m], velocity_std_floor [m/s]: least standard deviations believed.
     default_position_std, default_velocity_std: (horizontal, vertical) by name of FixStatus where the covariance is unknown.
+    use: what aids the filter; ``auto`` takes ranges where the log has them.
     """
 
     imu_noise: ImuNoise = GRADES["consumer"]
@@ -116,3 +167,6 @@ class FilterOptions:
         }
     )
     default_velocity_std: tuple[float, float] = (0.1, 0.2)
+    use: Literal["auto", "fixes", "ranges"] = "auto"
+    ranges: RangeOptions = RangeOptions()
+    motion: MotionOptions = MotionOptions()
