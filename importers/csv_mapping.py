@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 from importers.clock import count_ns, gps_from_gps_unix, is_time, unwrap_weeks
+from importers.csv_ranges import range_columns
 from importers.log import Table
 from importers.rows import NO_FIX, diagonal_covariance, drop_absurd, status_codes
 from importers.settings import Column, CsvMapping, CsvTime
@@ -20,6 +21,7 @@ __all__ = ["find_mapping", "read_mapped"]
 
 _UNIT_S = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _STATUS = {"none": NO_FIX} | {status.name.lower(): int(status) for status in FixStatus}
+_TEXTS = ("status", "sat", "signal")
 _GROUPS = {
     "gyro": ("gyro_x", "gyro_y", "gyro_z"),
     "accel": ("accel_x", "accel_y", "accel_z"),
@@ -52,7 +54,7 @@ def read_mapped(path: str, mapping: CsvMapping, gps_week: int | None, leap: Leap
     text = _read_matrix(path, mapping) if mapping.variable else _read_lines(path, mapping)
     place = f"{path}: the mapping for '{mapping.match}'"
     numbers = {str(quantity): _find_column(text, column, place) for quantity, column in mapping.columns.items()}
-    texts = {"status": numbers.pop("status")} if "status" in numbers and mapping.variable is None else {}
+    texts = {key: numbers.pop(key) for key in _TEXTS if key in numbers} if mapping.variable is None else {}
     time_columns = mapping.time.column if isinstance(mapping.time.column, tuple) else (mapping.time.column,)
     times = {f"time {i}": _find_column(text, column, place) for i, column in enumerate(time_columns)}
     dated = mapping.time.base.startswith("datetime")
@@ -132,6 +134,8 @@ def _read_times(
 
 def _build_columns(selection: Selection, mapping: CsvMapping, timed: np.ndarray, place: str) -> dict[str, np.ndarray]:
     columns = {name: values[timed] for name, values in selection.columns.items()}
+    if mapping.role == "range":
+        return range_columns(columns, mapping, place)
     out: dict[str, np.ndarray] = {
         key: drop_absurd(np.column_stack([columns[name] for name in names]).astype(np.float64))
         for key, names in _GROUPS.items()

@@ -13,6 +13,7 @@ from importers.load import build_timeline, describe_file, open_logs
 from importers.log import Channel, Log, Table
 from importers.messages import find_kind, stamp_column
 from importers.preflight import preflight
+from importers.range_conversion import flat_source
 from importers.selection import SETTING, Choice, candidates, choose_role
 from importers.settings import AttitudeInput, FixInput, ImuInput, InputSettings, ReferenceInput
 from importers.sources import Clock, Source, join_sources
@@ -132,7 +133,7 @@ def _describe(
     base = ""
     if table is not None:
         base = _guess_base(table, leap_seconds(settings.leap_seconds))
-        t_ns = np.sort(_times(log, channel, table, role, settings))
+        t_ns = _times(log, channel, table, role, settings)
         if (
             base in ("gps time", "tai")
             and "t_gps_ns" not in table.columns
@@ -166,9 +167,13 @@ def _times(log: Log, channel: Channel, table: Table, role: str | None, settings:
     by_role: dict[str, ImuInput | FixInput | AttitudeInput | ReferenceInput]
     by_role = {"imu": settings.imu, "attitude": settings.attitude, "reference": settings.reference}
     if role == "time" or len(table.log_time_ns) == 0:
-        return gps_from_utc(table.log_time_ns, leap_seconds(settings.leap_seconds))
+        return np.sort(gps_from_utc(table.log_time_ns, leap_seconds(settings.leap_seconds)))
     source = Source(log.path, channel, table, role or "unused")
-    return join_sources([source], by_role.get(role or "", settings.fix), Clock(leap_seconds(settings.leap_seconds))).t_ns
+    if (kind := find_kind(channel.type)) is not None and "range" in kind.roles:
+        return np.unique(flat_source(source).table.log_time_ns)
+    return np.sort(
+        join_sources([source], by_role.get(role or "", settings.fix), Clock(leap_seconds(settings.leap_seconds))).t_ns
+    )
 
 
 def _guess_base(table: Table, leap: LeapSeconds) -> str:

@@ -18,9 +18,9 @@ _VECTOR_KEYS = (("x", "y", "z"), ("x", "y", "z", "w"))
 class JsonDecoder:
     """Decodes the messages of one channel.
 
-    Objects {sec, nsec} (and their relatives) are times, {x, y, z} and {x, y, z, w} vectors, lists of numbers arrays. Lists of
-    anything else are left out. A number column is int64 where all its values are whole numbers, else float64 with NaN for
-    null and for what is missing.
+    Objects {sec, nsec} (and their relatives) are times, {x, y, z} and {x, y, z, w} vectors, lists of numbers arrays; lists
+    of objects stay as they are, in an object column; other lists are left out. A number column is int64 where all its values
+    are whole numbers, else float64 with NaN for null and for what is missing.
     """
 
     def decode(self, buffer: Buffer, start: Offsets, stop: Offsets) -> Decoded:
@@ -54,6 +54,8 @@ def _flatten(message: Mapping[str, Any], prefix: str) -> dict[str, Any]:
             row[path] = value
         elif all(_is_number(item) or item is None for item in value):
             row[path] = [np.nan if item is None else float(item) for item in value]
+        elif all(isinstance(item, dict) for item in value):
+            row[path] = value
     return row
 
 
@@ -76,7 +78,7 @@ def _column(values: list[Any]) -> np.ndarray:
         return np.array(values, dtype=np.int64)
     if kinds <= {int, float, type(None)} and kinds != {type(None)}:
         return np.array([np.nan if value is None else float(value) for value in values])
-    if kinds <= {list, type(None)} and list in kinds:
+    if kinds <= {list, type(None)} and list in kinds and not any(value and isinstance(value[0], dict) for value in values):
         width = max(len(value) for value in values if value is not None)
         return stack_lists([[np.nan] * width if value is None else value for value in values], np.dtype(float))
     column = np.empty(len(values), dtype=object)

@@ -7,10 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from importers.clock import leap_seconds
+from importers.ephemeris import join_ephemerides
 from importers.fix_conversion import convert_fixes
 from importers.formats import open_log
 from importers.imu_conversion import convert_imu
 from importers.log import Log, Table
+from importers.range_conversion import convert_ranges
 from importers.reference_conversion import convert_attitude, convert_reference, reference_from_fixes
 from importers.selection import Choice, choose_channels
 from importers.settings import InputSettings
@@ -66,13 +68,16 @@ def build_timeline(
     clock = Clock(leap_seconds(settings.leap_seconds), tuple(source.table for source in sources.get("time", [])))
     uses: list[ChannelUse] = [_time_use(source) for source in sources.get("time", [])]
     notes: list[str] = [f"{log.path}: {note}" for log in logs for note in log.notes]
-    imu = fixes = attitude = trajectory = None
+    imu = fixes = ranges = attitude = trajectory = None
     if "imu" in sources:
         imu, told, assumed = convert_imu(join_sources(sources["imu"], settings.imu, clock), settings.imu)
         uses, notes = [*uses, *told], [*notes, *assumed]
     if "fix" in sources or "velocity" in sources:
         position, velocity = (join_sources(sources[role], settings.fix, clock) if role in sources else None for role in _GNSS)
         fixes, told, assumed = convert_fixes(position, velocity, settings.fix)
+        uses, notes = [*uses, *told], [*notes, *assumed]
+    if "range" in sources:
+        ranges, told, assumed = convert_ranges(sources["range"], join_ephemerides([]), settings.range)
         uses, notes = [*uses, *told], [*notes, *assumed]
     if "attitude" in sources:
         attitude, told, assumed = convert_attitude(
@@ -91,6 +96,7 @@ def build_timeline(
     return Timeline(
         imu=imu,
         fixes=fixes,
+        ranges=ranges,
         attitude=attitude,
         reference=trajectory,
         fix_lever_b=np.array(settings.fix.lever_arm_m),

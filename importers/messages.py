@@ -10,6 +10,7 @@ import numpy as np
 
 from importers.log import Table
 from importers.nmea import NMEA_NOTE
+from importers.range_messages import RANGE_TYPES
 from importers.rows import NO_FIX, Rows
 from navreplay.rotation import scalar_first_from_last
 from navreplay.timeline import FixStatus, Floats, LogError
@@ -124,7 +125,7 @@ def _quaternion(columns: Mapping[str, np.ndarray]) -> Rows:
 
 
 def _no_rows(columns: Mapping[str, np.ndarray]) -> Rows:
-    raise LogError(f"a time reference with the columns {', '.join(columns)} has no rows of navigation")
+    raise LogError(f"messages with the columns {', '.join(columns)} have no rows of navigation")
 
 
 def _tum(columns: Mapping[str, np.ndarray]) -> Rows:
@@ -192,4 +193,4 @@ KINDS: dict[str, Kind] = {
     "csv/velocity": Kind(("velocity",), _mapped),
     "csv/attitude": Kind(("attitude",), _mapped),
     "csv/reference": Kind(("reference",), _mapped),
-}
+} | {type: Kind(("range",), _no_rows) for type in RANGE_TYPES}

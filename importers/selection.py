@@ -15,6 +15,7 @@ SETTING = {
     "imu": "input.imu.channel",
     "fix": "input.fix.channel",
     "velocity": "input.fix.velocity_channel",
+    "range": "input.range.channel",
     "attitude": "input.attitude.channel",
     "reference": "input.reference.channel",
 }
@@ -58,6 +59,7 @@ def choose_role(logs: Sequence[Log], settings: InputSettings, reference: Log | N
         "imu": settings.imu.channel,
         "fix": settings.fix.channel,
         "velocity": settings.fix.velocity_channel,
+        "range": settings.range.channel,
         "attitude": settings.attitude.channel,
     }[role]
     if name == NOTHING:

@@ -18,6 +18,8 @@ __all__ = [
     "ImuInput",
     "InputSettings",
     "Quantity",
+    "RangeCorrections",
+    "RangeInput",
     "ReferenceInput",
     "StatusName",
     "TimeBase",
@@ -28,6 +30,8 @@ Stamp = Literal["header", "log"]
 StatusName = Literal["unknown", "single", "differential", "float", "fixed", "dead_reckoning", "none"]
 Column = str | Annotated[int, Field(ge=1)]
 Vector = tuple[float, float, float]
+System = Literal["G", "R", "E", "C", "J"]
+Signal = Annotated[str, Field(pattern="^[1-9][A-Z]$")]
 
 Quantity = Literal[
     "gyro_x",
@@ -63,8 +67,30 @@ Quantity = Literal[
     "q_y",
     "q_z",
     "status",
+    "sat",
+    "signal",
+    "pseudorange",
+    "range_rate",
+    "doppler_hz",
+    "pseudorange_std",
+    "range_rate_std",
+    "cn0",
+    "sat_x",
+    "sat_y",
+    "sat_z",
+    "sat_vx",
+    "sat_vy",
+    "sat_vz",
+    "sat_clock_s",
+    "sat_clock_m",
+    "relativity_m",
+    "group_delay_m",
+    "ionosphere_m",
+    "troposphere_m",
 ]
-"""What a column of a text file can hold. ``yaw`` is clockwise from north; ``q_*`` is the quaternion body (FRD) to NED."""
+"""What a column of a text file can hold. ``yaw`` is clockwise from north; ``q_*`` is the quaternion body (FRD) to NED. Of
+ranges, ``sat_clock_*`` and ``relativity_m`` are added to the pseudorange, ``group_delay_m``, ``ionosphere_m`` and
+``troposphere_m`` (delays) are subtracted from it."""
 
 _ALONG = {"f": (1, 0, 0), "b": (-1, 0, 0), "r": (0, 1, 0), "l": (0, -1, 0), "d": (0, 0, 1), "u": (0, 0, -1)}
 
@@ -157,6 +183,32 @@ class ReferenceInput(_Settings):
     origin_deg_m: Vector | None = None
 
 
+class RangeInput(_Settings):
+    """Raw pseudoranges. navigation: files with ephemerides beside the logs (RINEX navigation, SP3, or a log that holds them).
+    systems: RINEX letters of the systems to use. signals: by system, the signals to use where a satellite has several, best
+    first, in place of those of L1, E1 and B1. Observations of a lower C/N0 are rejected."""
+
+    channel: str | None = None
+    time_offset_s: float = 0.0
+    systems: tuple[System, ...] = ("G", "E", "C", "J", "R")
+    signals: dict[System, tuple[Signal, ...]] = Field(default_factory=dict)
+    min_cn0_dbhz: float = Field(default=0.0, ge=0)
+    navigation: tuple[Path, ...] = ()
+
+
+class RangeCorrections(_Settings):
+    """What the pseudoranges of a table hold already, besides what its columns add. sagnac: ``none`` where satellites stand in
+    Earth-fixed axes of transmission, ``applied`` where they were turned to those of reception, ``pseudorange`` where that was
+    done by pseudorange / c, receiver clock included."""
+
+    satellite_clock: bool = False
+    relativity: bool = False
+    group_delay: bool = False
+    ionosphere: bool = False
+    troposphere: bool = False
+    sagnac: Literal["none", "applied", "pseudorange"] = "none"
+
+
 class CsvTime(_Settings):
     """Where the time of a row stands. base: ``gps`` counts from 1980-01-06, ``gps_unix`` from 1970 without leap seconds (as
     RTKLIB does), ``gps_tow`` from the start of the GPS week (week_column, or ``gps_week`` of the input), ``utc`` and ``tai``
@@ -173,10 +225,11 @@ class CsvMapping(_Settings):
     """Meaning of a text file (or of a matrix in a MATLAB file) without a layout of its own.
 
     match: pattern of the file's name. columns: by quantity, the name or the number (from 1) of its column. status: by the
-    text of a status column, the kind of fix. variable: name of the matrix in a MATLAB file."""
+    text of a status column, the kind of fix. variable: name of the matrix in a MATLAB file. corrections: of ranges, see
+    `RangeCorrections`. satellite_blocks: where satellites are mere numbers, the first number of each system."""
 
     match: str
-    role: Literal["imu", "fix", "velocity", "attitude", "reference"]
+    role: Literal["imu", "fix", "velocity", "attitude", "reference", "range"]
     time: CsvTime
     columns: dict[Quantity, Column] = Field(min_length=1)
     delimiter: str = "auto"
@@ -186,6 +239,8 @@ class CsvMapping(_Settings):
     angle_unit: Literal["deg", "rad"] = "deg"
     status: dict[str, StatusName] = Field(default_factory=dict)
     variable: str | None = None
+    corrections: RangeCorrections = RangeCorrections()
+    satellite_blocks: dict[System, Annotated[int, Field(ge=1)]] = Field(default_factory=dict)
 
 
 class InputSettings(_Settings):
@@ -198,6 +253,7 @@ class InputSettings(_Settings):
     utc_date: date | None = None
     imu: ImuInput = ImuInput()
     fix: FixInput = FixInput()
+    range: RangeInput = RangeInput()
     attitude: AttitudeInput = AttitudeInput()
     reference: ReferenceInput = ReferenceInput()
     csv: tuple[CsvMapping, ...] = ()

@@ -126,7 +126,7 @@ def test_json_location_fix(tmp_path: Path) -> None:
     assert columns["valid"].dtype == bool
     assert columns["pose.position"].tolist() == [[1, 2.5, 3]] * 3
     assert columns["pose.name"].tolist() == ["a"] * 3
-    assert "satellites" not in columns
+    assert columns["satellites"].tolist() == [[{"id": 1}]] * 3
 
 
 def test_json_that_is_none_is_rejected(tmp_path: Path) -> None:

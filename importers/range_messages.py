@@ -1,0 +1,106 @@
+"""Types and layouts that hold pseudoranges, and their tables with a row per satellite signal."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from importers.log import Table
+from importers.range_rows import Applied, satellite_names
+from navreplay.timeline import Floats
+
+__all__ = ["RANGE_TYPES", "flatten_epochs", "range_table"]
+
+NO_SATELLITES = "epoch without satellites"
+_NUMBERS = {
+    "pseudorange": "pseudorange_m",
+    "range_rate": "range_rate_mps",
+    "pseudorange_std": "pseudorange_std_m",
+    "range_rate_std": "range_rate_std_mps",
+    "cn0": "cn0_dbhz",
+}
+_VECTORS = {"sat_pos_e": "sat_pos_e_m", "sat_vel_e": "sat_vel_e_mps"}
+_CORRECTED = Applied.SATELLITE_CLOCK | Applied.RELATIVITY | Applied.GROUP_DELAY | Applied.TURNED
+
+
+def range_table(type: str, table: Table) -> Table:
+    """A table with one row per observation, columns as `importers.range_rows.range_rows` takes them. read counts observations
+    and the messages that hold none. Raises KeyError where the type's fields are missing."""
+    return RANGE_TYPES[type.replace("/msg/", "/")](table)
+
+
+def flatten_epochs(
+    table: Table, epochs: Sequence[Sequence[Any]], columns: Callable[[list[Any], np.ndarray], dict[str, np.ndarray]]
+) -> Table:
+    """A table of n messages with a row per observation. epochs: (n,) the observations of each message. columns: makes the
+    columns of all m observations, given them and the message (m,) that each is of."""
+    counts = np.array([len(epoch) for epoch in epochs], dtype=np.int64)
+    message = np.repeat(np.arange(len(epochs)), counts)
+    flat = columns([item for epoch in epochs for item in epoch], message)
+    rejected = dict(table.rejected)
+    if (counts == 0).any():
+        rejected[NO_SATELLITES] = int((counts == 0).sum())
+    return Table(flat["t_gps_ns"], flat, len(message) + sum(rejected.values()), rejected)
+
+
+def _as_they_are(table: Table) -> Table:
+    return table
+
+
+def _own(table: Table) -> Table:
+    """``navreplay.GnssRanges``, see docs/formats.md."""
+    n = len(table.log_time_ns)
+    epochs = [item if isinstance(item, list) else [] for item in table.columns["satellites"]]
+    epochs = [[sat for sat in epoch if isinstance(sat, dict)] for epoch in epochs]
+    t_ns = _whole(table.columns["t_gps_ns"])
+    applied = np.zeros(n, dtype=np.int64)
+    for name, meaning in (
+        ("corrected", _CORRECTED),
+        ("ionosphere_removed", Applied.IONOSPHERE),
+        ("troposphere_removed", Applied.TROPOSPHERE),
+    ):
+        applied |= np.where(_true(table.columns.get(name), n), int(meaning), 0)
+
+    def columns(satellites: list[Any], message: np.ndarray) -> dict[str, np.ndarray]:
+        out: dict[str, np.ndarray] = {"t_gps_ns": t_ns[message], "applied": applied[message]}
+        out["sat"] = satellite_names(np.array([str(sat.get("sat", "")) for sat in satellites], dtype="U8"))
+        out["signal"] = np.array([str(sat.get("signal", "")) for sat in satellites], dtype="U2")
+        out |= {name: _numbers([sat.get(key) for sat in satellites]) for name, key in _NUMBERS.items()}
+        out |= {name: _vectors([sat.get(key) for sat in satellites]) for name, key in _VECTORS.items()}
+        if "klobuchar" in table.columns and table.columns["klobuchar"].shape[1:] == (8,):
+            out["klobuchar"] = table.columns["klobuchar"].astype(np.float64)[message]
+        return out
+
+    return flatten_epochs(table, epochs, columns)
+
+
+def _whole(values: np.ndarray) -> np.ndarray:
+    """Stamps as integers; 0, which is before 1990, where there is none."""
+    if values.dtype.kind in "iu":
+        return values.astype(np.int64)
+    return np.array(
+        [value if isinstance(value, int) and abs(value) < 2**62 else 0 for value in values.tolist()], dtype=np.int64
+    )
+
+
+def _true(values: np.ndarray | None, n: int) -> np.ndarray:
+    return np.zeros(n, dtype=bool) if values is None else np.array([value is True for value in values.tolist()], dtype=bool)
+
+
+def _numbers(values: Sequence[Any]) -> Floats:
+    """Numbers (n,), NaN for whatever is none."""
+    return np.array([value if type(value) in (int, float) else np.nan for value in values], dtype=np.float64)
+
+
+def _vectors(values: Sequence[Any]) -> Floats:
+    """Vectors (n, 3), NaN for whatever is none."""
+    unknown = [np.nan] * 3
+    whole = [value if isinstance(value, list) and len(value) == 3 else unknown for value in values]
+    return np.column_stack([_numbers([value[axis] for value in whole]) for axis in range(3)])
+
+
+RANGE_TYPES: Mapping[str, Callable[[Table], Table]] = {
+    "csv/range": _as_they_are,
+    "navreplay.GnssRanges": _own,
+}
+"""By type (without the ``/msg/`` of ROS 2), what makes a table per observation of the table of its messages."""
