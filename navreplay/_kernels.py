@@ -127,6 +127,43 @@ def _step(x, dt, dtheta, dvel, c, dv_n, body):
 
 
 @njit(cache=True)
+def fill_steps(t_ns, gyro, accel, increments, in_gap, ends, dt, dtheta, dvel, bridged):
+    """Increments with coning and sculling over the steps that end at ends (k), which include all t_ns (n) but the first.
+
+    gyro, accel (n, 3): instantaneous samples, or means over the interval before each (increments). in_gap (n - 1): intervals
+    without slopes. With w = w0 + b t and f = f0 + d t over an interval T: coning T^3 / 12 (w x b), sculling
+    T^3 / 12 (w x d - b x f), w and f being means. Filled: dt (k), dtheta, dvel (k, 3), bridged (k).
+    """
+    w, f, b, d = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    begin = t_ns[0]
+    k = 0
+    for i in range(1, t_ns.shape[0]):
+        span = (t_ns[i] - t_ns[i - 1]) / 1e9
+        before = (t_ns[i - 1] - t_ns[i - 2]) / 1e9 if i > 1 else span
+        apart = (span + before) / 2 if increments else span
+        own = 1.0 if increments and not in_gap[i - 1] else 0.5
+        slope = 0.0 if in_gap[i - 1] else 1.0
+        for j in range(3):
+            w[j] = own * gyro[i, j] + (1 - own) * gyro[i - 1, j]
+            f[j] = own * accel[i, j] + (1 - own) * accel[i - 1, j]
+            b[j] = slope * (gyro[i, j] - gyro[i - 1, j]) / apart
+            d[j] = slope * (accel[i, j] - accel[i - 1, j]) / apart
+        square = span * span / 12
+        while k < ends.shape[0] and ends[k] <= t_ns[i]:
+            h = (ends[k] - begin) / 1e9
+            for j in range(3):
+                m, n = (j + 1) % 3, (j + 2) % 3
+                coning = w[m] * b[n] - w[n] * b[m]
+                sculling = w[m] * d[n] - w[n] * d[m] - (b[m] * f[n] - b[n] * f[m])
+                dtheta[k, j] = (w[j] + square * coning) * h
+                dvel[k, j] = (f[j] + square * sculling) * h
+            dt[k] = h
+            bridged[k] = in_gap[i - 1]
+            begin = ends[k]
+            k += 1
+
+
+@njit(cache=True)
 def integrate(start, dt, dtheta, dvel, states):
     """Mechanisation only: states (k, w) at the ends of k steps, from start (w)."""
     x = start.copy()
