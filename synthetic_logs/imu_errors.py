@@ -1,4 +1,4 @@
-"""Errors of an IMU: turn-on bias, in-run bias, scale factor, misalignment, white noise, quantisation.
+"""Errors of an IMU: turn-on and in-run bias, scale factor, misalignment, white noise, quantisation.
 
 measured = (I + diag(scale) + misalignment) true + bias + noise, rounded to the quantum. The noise figures are those of
 `navreplay.options.ImuNoise`, so that a filter can be told exactly what was drawn.
@@ -44,12 +44,14 @@ class _Triad:
     scale_std: float
     misalignment_std: float
     quantum: float
+    markov_std: float = 0.0
+    markov_tau: float = 1.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SensorErrors:
-    """What was drawn for one triad: bias (n, 3) at the stamps in its unit, matrix (3, 3) of scale factors and misalignments
-    (added to the identity)."""
+    """What was drawn for one triad: bias (n, 3) at the stamps in its unit, Gauss-Markov error included; matrix (3, 3) of scale
+    factors and misalignments (added to the identity)."""
 
     bias: Floats
     matrix: Floats
@@ -71,9 +73,17 @@ def draw_gauss_markov(rng: Generator, start: Floats, walk: float, tau: float, dt
     return np.asarray(lfilter([1.0], [1.0, -decay], drive, axis=0))
 
 
+def _draw_markov(model: _Triad, dt: float, n: int, seed: int) -> Floats:
+    rng = generator_for(seed, f"{model.name} Gauss-Markov error")
+    walk = model.markov_std * sqrt(2 / model.markov_tau)
+    return draw_gauss_markov(rng, model.markov_std * rng.standard_normal(3), walk, model.markov_tau, dt, n)
+
+
 def _disturb(true: Floats, dt: float, model: _Triad, seed: int) -> tuple[Floats, SensorErrors]:
     turn_on = model.bias_std * generator_for(seed, f"{model.name} turn-on bias").standard_normal(3)
     bias = draw_gauss_markov(generator_for(seed, f"{model.name} bias walk"), turn_on, model.walk, model.tau, dt, len(true))
+    if model.markov_std > 0:
+        bias = bias + _draw_markov(model, dt, len(true), seed)
     matrix = model.misalignment_std * generator_for(seed, f"{model.name} misalignment").standard_normal((3, 3))
     np.fill_diagonal(matrix, model.scale_std * generator_for(seed, f"{model.name} scale").standard_normal(3))
     noise = model.density / sqrt(dt) * generator_for(seed, f"{model.name} noise").standard_normal(true.shape)
@@ -98,6 +108,8 @@ def disturb_imu(true: ImuSeries, dt: float, errors: ImuErrors, seed: int) -> tup
         noise.gyro_scale_std,
         errors.gyro_misalignment_std,
         errors.gyro_quantum,
+        noise.gyro_markov_std,
+        noise.gyro_markov_tau,
     )
     accel_model = _Triad(
         "accel",

@@ -8,6 +8,7 @@ from navreplay.timeline import FixStatus
 from synthetic_logs.gnss import GnssErrors
 from synthetic_logs.imu_errors import ImuErrors
 from synthetic_logs.motion import Leg, Motion, accelerate, climb, course_rate_of_bank, spiral, stop, straight, turn
+from synthetic_logs.range_scenarios import RANGE_SCENARIOS
 from synthetic_logs.simulation import Journey, Scenario
 
 __all__ = ["SCENARIOS"]
@@ -215,5 +216,5 @@ _ALL = (
     ),
 )
 
-SCENARIOS: dict[str, Scenario] = {scenario.name: scenario for scenario in _ALL}
+SCENARIOS: dict[str, Scenario] = {scenario.name: scenario for scenario in _ALL} | RANGE_SCENARIOS
 """All scenarios by name."""

@@ -5,14 +5,21 @@ from functools import lru_cache
 
 import numpy as np
 
+from navreplay.atmosphere import SPEED_OF_LIGHT
 from navreplay.rotation import quat_from_euler
-from navreplay.timeline import Floats, GnssFixSeries, ImuSeries, LogError, Timeline, Times, Trajectory
+from navreplay.timeline import Floats, GnssFixSeries, ImuSeries, LogError, RangeSeries, Timeline, Times, Trajectory
+from synthetic_logs.constellation import Orbits, arrange_constellation
 from synthetic_logs.gnss import AntennaPath, FixErrors, GnssErrors, antenna_path, measure_fixes
 from synthetic_logs.imu import sense, sense_means
 from synthetic_logs.imu_errors import ImuErrors, SensorErrors, disturb_imu
 from synthetic_logs.motion import Motion, Path, trace
+from synthetic_logs.ranges import Epochs, RangeTruth, measure_ranges
+from synthetic_logs.receiver import Receiver
+from synthetic_logs.receiver_clock import draw_clock
 
-__all__ = ["Journey", "Scenario", "SyntheticLog", "ideal_imu", "simulate", "truth_at", "with_duration"]
+__all__ = ["Journey", "Scenario", "SyntheticLog", "ideal_imu", "orbits_of", "simulate", "truth_at", "with_duration"]
+
+_HOUR_NS = 3_600_000_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,33 +44,37 @@ class Journey:
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
-    """A journey with the errors of its sensors; description is one line."""
+    """A journey with the errors of its sensors; description is one line. gnss: fixes, None where the log has none. receiver: of
+    ranges, None where the log has none."""
 
     name: str
     description: str
     journey: Journey
     imu: ImuErrors
-    gnss: GnssErrors
+    gnss: GnssErrors | None
+    receiver: Receiver | None = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SyntheticLog:
     """A log and everything that went into it. truth: of the IMU, at every so many IMU stamps (Journey.truth_rate), its
-    covariance unknown. gyro_errors, accel_errors: at the IMU stamps. fix_errors: row by row of fixes."""
+    covariance unknown. gyro_errors, accel_errors: at the IMU stamps. fix_errors, range_truth: row by row of fixes, ranges."""
 
     scenario: Scenario
     seed: int
     imu: ImuSeries
-    fixes: GnssFixSeries
+    fixes: GnssFixSeries | None
+    ranges: RangeSeries | None
     truth: Trajectory
     gyro_errors: SensorErrors
     accel_errors: SensorErrors
-    fix_errors: FixErrors
+    fix_errors: FixErrors | None
+    range_truth: RangeTruth | None
 
     def timeline(self) -> Timeline:
         """The log as a filter sees it, with the truth as reference."""
         lever_b = np.array(self.scenario.journey.lever_b)
-        return Timeline(imu=self.imu, fixes=self.fixes, reference=self.truth, fix_lever_b=lever_b)
+        return Timeline(imu=self.imu, fixes=self.fixes, ranges=self.ranges, reference=self.truth, fix_lever_b=lever_b)
 
 
 def with_duration(scenario: Scenario, duration: float) -> Scenario:
@@ -82,10 +93,30 @@ def simulate(scenario: Scenario, seed: int) -> SyntheticLog:
         raise LogError(f"synthetic log: a seed is a whole number from 0 on, got {seed}")
     journey = scenario.journey
     imu, gyro_errors, accel_errors = disturb_imu(ideal_imu(journey), 1 / journey.imu_rate, scenario.imu, seed)
-    t_ns, antenna = _ideal_fixes(journey)
+    fixes, fix_errors = None, None
+    if scenario.gnss is not None:
+        t_ns, antenna = _ideal_fixes(journey)
+        t_s = (t_ns - journey.start_ns) / 1e9
+        fixes, fix_errors = measure_fixes(t_ns, t_s, 1 / journey.gnss_rate, antenna, scenario.gnss, seed)
+    ranges, range_truth = None, None
+    if scenario.receiver is not None:
+        epochs = _receiver_epochs(journey, scenario.receiver, seed)
+        ranges, range_truth = measure_ranges(scenario.receiver, orbits_of(journey, scenario.receiver), epochs, seed)
+    return SyntheticLog(scenario, seed, imu, fixes, ranges, _truth(journey), gyro_errors, accel_errors, fix_errors, range_truth)
+
+
+def orbits_of(journey: Journey, receiver: Receiver) -> Orbits:
+    """The satellites over a journey; they keep their places whatever the hour at which it starts."""
+    return arrange_constellation(receiver.systems, journey.start_ns // _HOUR_NS * _HOUR_NS)
+
+
+def _receiver_epochs(journey: Journey, receiver: Receiver, seed: int) -> Epochs:
+    t_ns = _stamps(journey, journey.gnss_rate, journey.gnss_offset)
+    clock = draw_clock(receiver.clock, len(t_ns), 1 / journey.gnss_rate, seed)
+    motion = _journey_path(journey).at(_path_time(journey, t_ns) - clock.offset / SPEED_OF_LIGHT)
+    antenna = antenna_path(motion, np.array(journey.lever_b))
     t_s = (t_ns - journey.start_ns) / 1e9
-    fixes, fix_errors = measure_fixes(t_ns, t_s, 1 / journey.gnss_rate, antenna, scenario.gnss, seed)
-    return SyntheticLog(scenario, seed, imu, fixes, _truth(journey), gyro_errors, accel_errors, fix_errors)
+    return Epochs(1 / journey.gnss_rate, t_ns, t_s, clock, antenna, motion.euler[:, 2])
 
 
 def _stamps(journey: Journey, rate: float, offset: float) -> Times:

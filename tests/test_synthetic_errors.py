@@ -224,7 +224,10 @@ def test_every_scenario_simulates_and_names_itself():
         assert timeline.imu.increments == scenario.journey.increments
         assert timeline.reference.t_ns[0] == timeline.imu.t_ns[0] == scenario.journey.start_ns
         np.testing.assert_array_equal(np.isin(log.truth.t_ns, log.imu.t_ns), True)
-        assert log.fixes.has_velocity.all() == (scenario.gnss.velocity_std is not None)
+        assert (timeline.fixes is None) == (scenario.gnss is None)
+        assert (timeline.ranges is None) == (scenario.receiver is None)
+        if scenario.gnss is not None:
+            assert log.fixes.has_velocity.all() == (scenario.gnss.velocity_std is not None)
 
 
 def test_epochs_of_gnss_lie_between_imu_samples_where_asked():

@@ -17,6 +17,7 @@ from navreplay.timeline import FixStatus, LogError
 from synthetic_logs import FORMATS, SCENARIOS, simulate, with_duration, write
 
 LOG = simulate(with_duration(SCENARIOS["car-short"], 12.0), 5)
+RANGES = simulate(with_duration(SCENARIOS["ranges-open"], 5.0), 5)
 WITHOUT_VELOCITY = simulate(with_duration(SCENARIOS["aircraft-spiral"], 5.0), 5)
 FLU = np.array([1.0, -1.0, -1.0])
 TOPICS = {
@@ -194,13 +195,14 @@ def test_csv_marks_means_and_leaves_unknown_velocity_empty(tmp_path):
 
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_nothing_is_overwritten(tmp_path, suffix):
-    write(LOG, tmp_path / f"log{suffix}")
+    log = RANGES if suffix == ".obs" else LOG
+    write(log, tmp_path / f"log{suffix}")
     with pytest.raises(LogError, match="exists already; remove it or choose another name"):
-        write(LOG, tmp_path / f"log{suffix}")
+        write(log, tmp_path / f"log{suffix}")
 
 
 def test_paths_that_cannot_be_written_are_refused_in_one_line(tmp_path):
-    with pytest.raises(LogError, match=r"no format has the extension '.xyz'; use one of .mcap, .bag, .db3, .csv, or none"):
+    with pytest.raises(LogError, match=r"no format has the extension '.xyz'; use one of .mcap, .bag, .db3, .csv, .obs, or none"):
         write(LOG, tmp_path / "log.xyz")
     (tmp_path / "file").touch()
     with pytest.raises(LogError, match="cannot be written"):

@@ -1,4 +1,4 @@
-"""Synthetic logs as files: MCAP, ROS 1 bag, ROS 2 bag, CSV; the truth always beside as CSV."""
+"""Synthetic logs as files: MCAP, ROS 1 bag, ROS 2 bag, CSV, RINEX; the truth always beside as CSV."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -9,25 +9,29 @@ from synthetic_logs.simulation import SyntheticLog
 __all__ = ["FORMATS", "write"]
 
 FORMATS: dict[str, str] = {
-    ".mcap": "MCAP with ROS 2 messages, chunks compressed with zstd",
-    ".bag": "ROS 1 bag",
-    ".db3": "ROS 2 bag, the bare SQLite file",
-    "": "ROS 2 bag, a directory with metadata.yaml and the SQLite file",
-    ".csv": "NAME.imu.csv and NAME.fix.csv in our own columns",
+    ".mcap": "MCAP with ROS 2 messages and ranges in JSON, chunks compressed with zstd",
+    ".bag": "ROS 1 bag (logs without ranges)",
+    ".db3": "ROS 2 bag, the bare SQLite file (logs without ranges)",
+    "": "ROS 2 bag, a directory with metadata.yaml and the SQLite file (logs without ranges)",
+    ".csv": "NAME.imu.csv, NAME.fix.csv and NAME.ranges.csv in our own columns",
+    ".obs": "ranges as RINEX 3 NAME.obs and NAME.nav, with NAME.imu.csv",
 }
 """What `write` can produce, by extension of the path."""
+_BAGS = (".bag", ".db3", "")
 
 
 def write(log: SyntheticLog, path: str | Path) -> tuple[Path, ...]:
     """Writes a log in the format that the extension names (see `FORMATS`) and its truth as NAME.truth.csv beside it.
 
-    Returns the paths written. Raises LogError for an unknown extension, for a path that exists already and for one that cannot
-    be written.
+    Returns the paths written, the truth last. Raises LogError for an unknown extension, for a path that exists already, for one
+    that cannot be written and for a format that cannot hold what the log has.
     """
     path = Path(path)
     write_log = _writer(path)
+    if log.ranges is not None and path.suffix in _BAGS:
+        raise LogError(f"{path}: a ROS bag cannot hold the ranges of {log.scenario.name}; write .mcap, .csv or .obs")
     truth = path.with_suffix(".truth.csv")
-    logs = (path.with_suffix(".imu.csv"), path.with_suffix(".fix.csv")) if path.suffix == ".csv" else (path,)
+    logs = _log_paths(log, path)
     for target in (*logs, truth):
         if target.exists():
             raise LogError(f"{target}: exists already; remove it or choose another name")
@@ -42,6 +46,15 @@ def write(log: SyntheticLog, path: str | Path) -> tuple[Path, ...]:
     return (*logs, truth)
 
 
+def _log_paths(log: SyntheticLog, path: Path) -> tuple[Path, ...]:
+    if path.suffix == ".obs":
+        return path, path.with_suffix(".nav"), path.with_suffix(".imu.csv")
+    if path.suffix != ".csv":
+        return (path,)
+    kinds = [".imu.csv", *([".fix.csv"] if log.fixes is not None else []), *([".ranges.csv"] if log.ranges is not None else [])]
+    return tuple(path.with_suffix(kind) for kind in kinds)
+
+
 def _writer(path: Path) -> Callable[[SyntheticLog, Path], None]:
     """The writer for a path; each format's library is imported only when it is needed."""
     if path.suffix == ".mcap":
@@ -52,7 +65,11 @@ def _writer(path: Path) -> Callable[[SyntheticLog, Path], None]:
         from synthetic_logs.writers.text import write_csv
 
         return write_csv
-    if path.suffix in (".bag", ".db3", ""):
+    if path.suffix == ".obs":
+        from synthetic_logs.writers.rinex import write_rinex
+
+        return write_rinex
+    if path.suffix in _BAGS:
         from synthetic_logs.writers import ros_bags
 
         return {".bag": ros_bags.write_ros1, ".db3": ros_bags.write_ros2_file, "": ros_bags.write_ros2}[path.suffix]

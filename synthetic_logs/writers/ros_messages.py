@@ -18,7 +18,7 @@ import numpy as np
 
 from navreplay.rotation import enu_from_ned, flu_from_frd
 from navreplay.time_scales import utc_from_gps
-from navreplay.timeline import FixStatus, Times
+from navreplay.timeline import FixStatus, GnssFixSeries, ImuSeries, Times
 from synthetic_logs.simulation import SyntheticLog
 
 __all__ = ["Encoding", "Messages", "in_time_order", "messages_of"]
@@ -49,10 +49,12 @@ class Messages:
 
 
 def messages_of(log: SyntheticLog, encoding: Encoding) -> tuple[Messages, ...]:
-    """All topics of a log; without /gnss/vel where the log has no velocity."""
-    topics = [_imu(log, encoding), _fixes(log, encoding)]
-    if log.fixes.has_velocity.any():
-        topics.append(_velocities(log, encoding))
+    """All topics of a log but for its ranges; without /gnss/fix and /gnss/vel where the log has no fixes or no velocity."""
+    topics = [_imu(log.imu, encoding)]
+    if log.fixes is not None:
+        topics.append(_fixes(log.fixes, encoding))
+        if log.fixes.has_velocity.any():
+            topics.append(_velocities(log.fixes, encoding))
     return tuple(topics)
 
 
@@ -69,24 +71,23 @@ def in_time_order(topics: tuple[Messages, ...]) -> Iterator[tuple[int, int, byte
         yield topic, time, raw[topic][row * size : (row + 1) * size]
 
 
-def _imu(log: SyntheticLog, encoding: Encoding) -> Messages:
-    n = len(log.imu)
+def _imu(imu: ImuSeries, encoding: Encoding) -> Messages:
+    n = len(imu)
     unknown = np.zeros((n, 9))
     no_orientation = unknown.copy()
     no_orientation[:, 0] = -1
     fields: dict[str, np.ndarray] = {
         "orientation": np.tile([0.0, 0.0, 0.0, 1.0], (n, 1)),
         "orientation_covariance": no_orientation,
-        "angular_velocity": flu_from_frd(log.imu.gyro),
+        "angular_velocity": flu_from_frd(imu.gyro),
         "angular_velocity_covariance": unknown,
-        "linear_acceleration": flu_from_frd(log.imu.accel),
+        "linear_acceleration": flu_from_frd(imu.accel),
         "linear_acceleration_covariance": unknown,
     }
-    return _messages("/imu/data", "sensor_msgs/msg/Imu", log.imu.t_ns, "imu", fields, encoding)
+    return _messages("/imu/data", "sensor_msgs/msg/Imu", imu.t_ns, "imu", fields, encoding)
 
 
-def _fixes(log: SyntheticLog, encoding: Encoding) -> Messages:
-    fixes = log.fixes
+def _fixes(fixes: GnssFixSeries, encoding: Encoding) -> Messages:
     n = len(fixes)
     rotated = enu_from_ned(np.swapaxes(enu_from_ned(fixes.cov_pos), 1, 2))
     fields: dict[str, np.ndarray] = {
@@ -101,11 +102,11 @@ def _fixes(log: SyntheticLog, encoding: Encoding) -> Messages:
     return _messages("/gnss/fix", "sensor_msgs/msg/NavSatFix", fixes.t_ns, "gnss", fields, encoding)
 
 
-def _velocities(log: SyntheticLog, encoding: Encoding) -> Messages:
-    known = log.fixes.has_velocity
-    linear = enu_from_ned(log.fixes.vel_n[known])
+def _velocities(fixes: GnssFixSeries, encoding: Encoding) -> Messages:
+    known = fixes.has_velocity
+    linear = enu_from_ned(fixes.vel_n[known])
     fields: dict[str, np.ndarray] = {"linear": linear, "angular": np.zeros_like(linear)}
-    return _messages("/gnss/vel", "geometry_msgs/msg/TwistStamped", log.fixes.t_ns[known], "enu", fields, encoding)
+    return _messages("/gnss/vel", "geometry_msgs/msg/TwistStamped", fixes.t_ns[known], "enu", fields, encoding)
 
 
 def _messages(

@@ -10,30 +10,57 @@ import numpy as np
 import pyarrow as pa
 from pyarrow import csv
 
-from navreplay.timeline import FixStatus, Floats
+from navreplay.timeline import FixStatus, Floats, GnssFixSeries, ImuSeries, RangeSeries
 from synthetic_logs.simulation import SyntheticLog
 
-__all__ = ["write_csv", "write_truth"]
+__all__ = ["write_csv", "write_imu", "write_truth"]
 
 
 def write_csv(log: SyntheticLog, path: Path) -> None:
-    """NAME.imu.csv and NAME.fix.csv for the path NAME.csv. IMU columns have the prefix ``mean_`` where samples are means."""
-    imu, fixes = log.imu, log.fixes
+    """NAME.imu.csv, and NAME.fix.csv and NAME.ranges.csv where the log has fixes and ranges, for the path NAME.csv."""
+    write_imu(log.imu, path.with_suffix(".imu.csv"))
+    if log.fixes is not None:
+        _write_fixes(log.fixes, path.with_suffix(".fix.csv"))
+    if log.ranges is not None:
+        _write_ranges(log.ranges, path.with_suffix(".ranges.csv"))
+
+
+def write_imu(imu: ImuSeries, path: Path) -> None:
+    """The samples of an IMU; columns have the prefix ``mean_`` where samples are means."""
     prefix = "mean_" if imu.increments else ""
-    imu_columns = {
+    columns = {
         "t_gps_ns": imu.t_ns,
         **_columns([f"{prefix}gyro_{axis}_radps" for axis in "xyz"], imu.gyro),
         **_columns([f"{prefix}accel_{axis}_mps2" for axis in "xyz"], imu.accel),
     }
-    _write_table(path.with_suffix(".imu.csv"), imu_columns)
-    fix_columns = {
+    _write_table(path, columns)
+
+
+def _write_fixes(fixes: GnssFixSeries, path: Path) -> None:
+    columns = {
         "t_gps_ns": fixes.t_ns,
         **_position_and_velocity(fixes.lla, fixes.vel_n),
         **_columns(["std_n_m", "std_e_m", "std_d_m"], _std(fixes.cov_pos)),
         **_columns(["std_vn_mps", "std_ve_mps", "std_vd_mps"], _std(fixes.cov_vel)),
         "status": np.array([FixStatus(status).name for status in fixes.status.tolist()]),
     }
-    _write_table(path.with_suffix(".fix.csv"), fix_columns)
+    _write_table(path, columns)
+
+
+def _write_ranges(ranges: RangeSeries, path: Path) -> None:
+    columns = {
+        "t_gps_ns": ranges.t_ns,
+        "sat": ranges.sat,
+        "signal": ranges.signal,
+        "pseudorange_m": ranges.pseudorange,
+        "range_rate_mps": ranges.range_rate,
+        "pseudorange_std_m": ranges.pseudorange_std,
+        "range_rate_std_mps": ranges.range_rate_std,
+        "cn0_dbhz": ranges.cn0,
+        **_columns(["sat_x_m", "sat_y_m", "sat_z_m"], ranges.sat_pos_e),
+        **_columns(["sat_vx_mps", "sat_vy_mps", "sat_vz_mps"], ranges.sat_vel_e),
+    }
+    _write_table(path, columns)
 
 
 def write_truth(log: SyntheticLog, path: Path) -> None:
