@@ -55,9 +55,9 @@ class Evaluation:
     """A solution judged by a reference, at the k reference epochs that the solution covers.
 
     t_ns: (k,). errors: by quantity: position, and velocity and attitude where the reference knows them. in_outage: (k,)
-    bool, no fix used since the last epoch. statistics: by stretch (all, outside, inside outages), quantity and component
-    (the labels; horizontal and 3d for position and velocity). nees: by quantity. within_3_sigma: share of errors by
-    quantity and label (0.9973 expected).
+    bool, see `mark_unaided`. statistics: by stretch (all, outside, inside outages), quantity and component (the labels;
+    horizontal and 3d for position and velocity). nees: by quantity. within_3_sigma: share of errors by quantity and label
+    (0.9973 expected).
     """
 
     t_ns: Times

@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navreplay.earth import ned_between
-from navreplay.solution import Outage, Solution
+from navreplay.solution import Outage, OutageCause, Solution
 from navreplay.statistics import Statistics, summarise
 from navreplay.timeline import Floats, Times, Trajectory
 
-__all__ = ["OutageErrors", "assess_outages", "find_outages", "mark_unaided", "summarise_outages"]
+__all__ = ["OutageErrors", "assess_outages", "count_outages", "find_outages", "mark_unaided", "summarise_outages"]
 
 _END_TOLERANCE_S = 1.5
 """An outage's end error counts at the last reference epoch within this time before its end."""
@@ -35,8 +35,9 @@ class OutageErrors:
     max_3d: float
 
 
-def _used_position_times(solution: Solution) -> Times:
-    times = [series.t_ns[series.used] for series in solution.innovations if series.kind == "position"]
+def _position_times(solution: Solution, used_only: bool = True) -> Times:
+    positions = [series for series in solution.innovations if series.kind == "position"]
+    times = [series.t_ns[series.used] if used_only else series.t_ns for series in positions]
     return np.unique(np.concatenate([np.empty(0, dtype=np.int64), *times]))
 
 
@@ -46,11 +47,12 @@ def find_outages(
     """Stretches of at least min_length_s [s], and of 1.5 usual fix intervals, without a used position.
 
     An outage starts at the last used fix (or the first row) and ends at the next one (or the last row); where a simulated
-    window (start_ns, end_ns] lies in it and the next fix after the window was used, it ends with the window.
+    window (start_ns, end_ns] lies in it and the next fix after the window was used, it ends with the window. Its cause is
+    ``fixes rejected`` where refused fixes leave no stretch of that length without any.
     """
     if len(solution) == 0:
         return ()
-    used = _used_position_times(solution)
+    used, offered = _position_times(solution), _position_times(solution, used_only=False)
     edges = np.unique(np.concatenate([solution.t_ns[:1], used, solution.t_ns[-1:]]))
     usual_ns = float(np.median(np.diff(used))) if len(used) > 1 else 0.0
     limit_ns = max(min_length_s * 1e9, 1.5 * usual_ns)
@@ -61,21 +63,29 @@ def find_outages(
             continue
         inside = [stop for begin, stop in windows if begin < end and stop > start]
         prompt = [stop for stop in inside if stop < end and end - stop < limit_ns]
-        outages.append(Outage(start, max(prompt, default=end), bool(inside)))
+        tried = np.array([start, *offered[(offered > start) & (offered < end)].tolist(), end])
+        missing = bool((np.diff(tried) >= limit_ns).any())
+        cause: OutageCause = "simulated" if inside else "no fixes" if missing else "fixes rejected"
+        outages.append(Outage(start, max(prompt, default=end), cause))
     return tuple(outages)
 
 
 def _next_used_time(solution: Solution, outage: Outage) -> int:
     """Of the first fix used after the outage began, or behind the solution where there is none."""
-    used = _used_position_times(solution)
+    used = _position_times(solution)
     later = used[used > outage.start_ns + _TOLERANCE_NS]
     return int(later[0]) if len(later) else int(solution.t_ns[-1]) + 1
 
 
 def mark_unaided(t_ns: Times, solution: Solution, outages: Iterable[Outage]) -> NDArray[np.bool_]:
-    """(k,) whether t_ns (k,) lies behind the start of an outage and before the next fix that was used."""
+    """(k,) whether t_ns (k,) lies behind the start of an outage and before the next fix that was used.
+
+    Stretches in which the filter refused fixes do not count: they are its own doing, and differ from filter to filter.
+    """
     mask = np.zeros(len(t_ns), dtype=np.bool_)
     for outage in outages:
+        if outage.cause == "fixes rejected":
+            continue
         mask |= (t_ns > outage.start_ns + _TOLERANCE_NS) & (t_ns < _next_used_time(solution, outage))
     return mask
 
@@ -123,8 +133,16 @@ def _measure_outage(error: Floats, reaches_end: bool) -> tuple[float, float, flo
     return *end, float(horizontal.max()), float(total.max())
 
 
-def summarise_outages(outages: Iterable[OutageErrors]) -> dict[str, Statistics]:
-    """Statistics over outages of end_horizontal, end_3d, max_horizontal and max_3d."""
+def count_outages(outages: Iterable[OutageErrors]) -> tuple[OutageErrors, ...]:
+    """Those a summary counts: the simulated ones where there are any, else those the log brings; never those in which the
+    filter refused fixes, lest methods be judged on different stretches."""
     outages = tuple(outages)
+    simulated = tuple(errors for errors in outages if errors.outage.cause == "simulated")
+    return simulated or tuple(errors for errors in outages if errors.outage.cause == "no fixes")
+
+
+def summarise_outages(outages: Iterable[OutageErrors]) -> dict[str, Statistics]:
+    """Statistics of end_horizontal, end_3d, max_horizontal and max_3d over the outages that `count_outages` keeps."""
+    outages = count_outages(outages)
     names = ("end_horizontal", "end_3d", "max_horizontal", "max_3d")
     return {name: summarise(np.array([getattr(outage, name) for outage in outages], dtype=np.float64)) for name in names}

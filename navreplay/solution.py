@@ -2,13 +2,17 @@
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from navreplay.timeline import Floats, Times
 
-__all__ = ["Event", "InnovationSeries", "Outage", "RowStatus", "Solution"]
+__all__ = ["Event", "InnovationSeries", "Outage", "OutageCause", "RowStatus", "Solution"]
+
+OutageCause = Literal["simulated", "no fixes", "fixes rejected"]
+"""The configuration withheld the fixes, the log has none, or the filter refused them."""
 
 
 class RowStatus(IntEnum):
@@ -54,11 +58,11 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class Outage:
-    """A stretch without a used position. simulated: True when the configuration withheld the fixes in it."""
+    """A stretch without a used position."""
 
     start_ns: int
     end_ns: int
-    simulated: bool
+    cause: OutageCause
 
 
 @dataclass(frozen=True, eq=False, slots=True)

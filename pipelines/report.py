@@ -23,6 +23,7 @@ from navreplay.metrics import (
     summarise,
     summarise_outages,
 )
+from navreplay.outages import count_outages
 from navreplay.solution import InnovationSeries, Solution
 from navreplay.time_scales import week_tow_from_gps
 from navreplay.timeline import Provenance
@@ -53,6 +54,7 @@ def build_report(result: RunResult) -> Report:
         "innovations": {series.kind: _describe_innovations(series) for series in solution.innovations},
         "outages": {
             "count": len(outages),
+            "counted": len(count_outages(outages)),
             "summary": {name: _plain(statistics) for name, statistics in summarise_outages(outages).items()},
             "list": [_describe_outage(outage, int(solution.t_ns[0])) for outage in outages],
         },
@@ -160,7 +162,7 @@ def _describe_outage(errors: OutageErrors, origin_ns: int) -> dict[str, Any]:
         "start_gps_tow_s": float(tow[0]),
         "end_gps_tow_s": float(tow[1]),
         "start_elapsed_s": (outage.start_ns - origin_ns) / 1e9,
-        "simulated": outage.simulated,
+        "cause": outage.cause,
         "length_s": errors.length_s,
         "distance_m": _plain(errors.distance_m),
         "end_horizontal_m": _plain(errors.end_horizontal),

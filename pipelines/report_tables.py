@@ -54,7 +54,7 @@ def headline_figures(report: Report) -> tuple[Figure, ...]:
     figures = [Figure("Drive", _duration_text(drive["duration_s"]), f"{distance}, method {drive['method']}")]
     errors = report["errors"]
     if errors is not None:
-        stretch = "outside" if report["outages"]["count"] and errors["outside"]["position"]["horizontal"]["count"] else "all"
+        stretch = "outside" if report["outages"]["counted"] and errors["outside"]["position"]["horizontal"]["count"] else "all"
         position = errors[stretch]["position"]
         words = _STRETCHES[stretch]
         for name, component in (("Horizontal error", "horizontal"), ("Height error", "down")):
@@ -82,7 +82,7 @@ def _outage_figures(outages: Mapping[str, Any]) -> list[Figure]:
     if not summary["count"]:
         longest = max(outage["length_s"] for outage in outages["list"])
         return [Figure("Outages", str(outages["count"]), f"longest {longest:.0f} s")]
-    context = f"median of {summary['count']} outages; 95 % {figure_text(summary['p95'], 'm')}"
+    context = f"median of {_counted_text(outages)}; 95 % {figure_text(summary['p95'], 'm')}"
     return [Figure("Horizontal error at outage end", figure_text(summary["p50"], "m"), context)]
 
 
@@ -139,15 +139,21 @@ def _outage_tables(outages: Mapping[str, Any]) -> list[Table]:
             figure_text(outage["length_s"], "s"),
             figure_text(outage["distance_m"], "m"),
             *(figure_text(outage[name]) for name in names),
-            "simulated" if outage["simulated"] else "",
+            outage["cause"],
         )
         for number, outage in enumerate(outages["list"], start=1)
     ]
-    for share in ("p50", "p95"):
+    counted = f"of {_counted_text(outages)}"
+    for share, word in (("p50", "median"), ("p95", "95 %")) if outages["counted"] else ():
         figures = (figure_text(outages["summary"][name.removesuffix("_m")][share]) for name in names)
-        rows.append(("median" if share == "p50" else "95 %", "", "", "", *figures, ""))
-    header = ("", "start UTC", "length", "distance", "end horizontal", "end 3-D", "largest horizontal", "largest 3-D", "")
+        rows.append((word, "", "", "", *figures, counted))
+    header = ("", "start UTC", "length", "distance", "end horizontal", "end 3-D", "largest horizontal", "largest 3-D", "cause")
     return [Table("Outages [m]", header, tuple(rows), "Errors at the end are those before the next fix corrects.")]
+
+
+def _counted_text(outages: Mapping[str, Any]) -> str:
+    simulated = any(outage["cause"] == "simulated" for outage in outages["list"])
+    return f"{outages['counted']} {'simulated' if simulated else 'without fixes'}"
 
 
 def _consistency_table(report: Report) -> Table:

@@ -156,7 +156,7 @@ def _send_events(recording: rr.RecordingStream, result: RunResult) -> None:
     rows += [(int(solution.t_ns[0]), finding.level, finding.text) for finding in result.findings]
     for errors in outage_errors(result):
         end = "" if np.isnan(errors.end_horizontal) else f", horizontal error at its end {errors.end_horizontal:.2f} m"
-        rows.append((errors.outage.start_ns, "info", f"outage of {errors.length_s:.1f} s begins{end}"))
+        rows.append((errors.outage.start_ns, "info", f"outage of {errors.length_s:.1f} s ({errors.outage.cause}) begins{end}"))
     if not rows:
         return
     rows.sort(key=lambda row: row[0])

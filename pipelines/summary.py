@@ -5,6 +5,7 @@ from math import isfinite
 from pathlib import Path
 
 from navreplay.metrics import Evaluation, summarise_outages
+from navreplay.outages import count_outages
 from navreplay.timeline import Provenance
 from pipelines.result import RunResult
 
@@ -86,7 +87,13 @@ def _describe_errors(evaluation: Evaluation) -> list[str]:
             )
     ends = summarise_outages(evaluation.outages)["end_horizontal"]
     if ends.count:
-        lines.append(f"end of outage:   horizontal error {ends.p50:.2f} m median, {ends.p95:.2f} m 95 % ({ends.count} outages)")
+        counted = count_outages(evaluation.outages)
+        kind = "simulated outages" if counted[0].outage.cause == "simulated" else "outages"
+        others = len(evaluation.outages) - len(counted)
+        apart = f"; {others} of other causes in the report" if others else ""
+        lines.append(
+            f"end of outage:   horizontal error {ends.p50:.2f} m median, {ends.p95:.2f} m 95 % ({ends.count} {kind}{apart})"
+        )
     return lines
 
 

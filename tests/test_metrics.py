@@ -7,6 +7,7 @@ import pytest
 
 from navreplay.earth import move_lla, ned_between
 from navreplay.metrics import compute_nis, evaluate, find_outages, interpolate, summarise, summarise_outages
+from navreplay.outages import count_outages
 from navreplay.rotation import matrix_from_quat, quat_from_rotvec, quat_multiply, rotvec_from_quat
 from navreplay.solution import Outage, RowStatus, Solution
 from navreplay.statistics import judge_squares
@@ -154,9 +155,9 @@ def test_consistency_of_drawn_errors_and_innovations() -> None:
 def test_outages_end_at_the_next_used_fix_or_with_their_window() -> None:
     solution = make_solution(duration_s=60, outage_every_s=30, outage_s=10)
     first = START_NS + 20 * SECOND
-    assert find_outages(solution)[0] == Outage(first, first + 10 * SECOND, simulated=False)
+    assert find_outages(solution)[0] == Outage(first, first + 10 * SECOND, "no fixes")
     window = (first, first + 9 * SECOND)
-    assert find_outages(solution, [window])[0] == Outage(first, first + 9 * SECOND, simulated=True)
+    assert find_outages(solution, [window])[0] == Outage(first, first + 9 * SECOND, "simulated")
     assert find_outages(solution, min_length_s=30) == ()
     early = (first, first + 3 * SECOND)
     assert find_outages(solution, [early])[0].end_ns == first + 10 * SECOND
@@ -185,6 +186,32 @@ def test_outage_summary_takes_median_and_percentile_over_outages() -> None:
     summary = summarise_outages(evaluation.outages)["end_horizontal"]
     assert summary.count == len(ends) == 10
     assert summary.p50 == pytest.approx(np.median(ends))
+
+
+def test_only_simulated_outages_are_counted_where_there_are_any() -> None:
+    solution = make_solution(duration_s=60, outage_every_s=30, outage_s=10)
+    first = START_NS + 20 * SECOND
+    reference = truth(solution.t_ns)
+    both = evaluate(replace(solution, outages=find_outages(solution)), reference)
+    assert [errors.outage.cause for errors in both.outages] == ["no fixes", "no fixes"]
+    assert count_outages(both.outages) == both.outages
+    mixed = evaluate(replace(solution, outages=find_outages(solution, [(first, first + 9 * SECOND)])), reference)
+    assert [errors.outage.cause for errors in mixed.outages] == ["simulated", "no fixes"]
+    assert count_outages(mixed.outages) == mixed.outages[:1]
+    assert summarise_outages(mixed.outages)["end_horizontal"].count == 1
+
+
+def test_stretches_of_refused_fixes_are_told_but_not_counted() -> None:
+    solution = make_solution(duration_s=60, outage_every_s=100)
+    position, velocity = solution.innovations
+    seconds = (position.t_ns - START_NS) // SECOND
+    refused = replace(position, used=position.used & ~((seconds > 30) & (seconds < 40)))
+    solution = replace(solution, innovations=(refused, velocity), outages=())
+    evaluation = evaluate(solution, truth(solution.t_ns))
+    assert evaluation.outages[0].outage == Outage(START_NS + 30 * SECOND, START_NS + 40 * SECOND, "fixes rejected")
+    assert count_outages(evaluation.outages) == ()
+    assert not evaluation.in_outage.any()
+    assert summarise_outages(evaluation.outages)["end_horizontal"].count == 0
 
 
 def test_covariance_that_is_not_positive_gives_no_nees() -> None:

@@ -33,7 +33,7 @@ def test_withheld_fixes_are_an_outage_and_stay_in_the_timeline():
     assert len(result.used.fixes) == len(LOG.fixes) - 10
     assert len(result.timeline.fixes) == len(LOG.fixes)
     (outage,) = result.solution.outages
-    assert outage.simulated
+    assert outage.cause == "simulated"
     assert (outage.start_ns, outage.end_ns) == (LOG.fixes.t_ns[60], LOG.fixes.t_ns[70])
     assert result.evaluation.outages[0].end_horizontal > 0
     assert any(line.startswith("end of outage:") for line in summarise_run(result))

@@ -85,7 +85,7 @@ def test_events_hold_outages_and_findings(recording: Path) -> None:
     table = read_entity(recording, "/events")
     texts = [row[0] for row in table["TextLog:text"].to_pylist()]
     assert "The IMU rate varies by 12 %." in texts
-    assert any(text.startswith("outage of 10.0 s begins, horizontal error at its end") for text in texts)
+    assert any(text.startswith("outage of 10.0 s (no fixes) begins, horizontal error at its end") for text in texts)
     assert {row[0] for row in table["TextLog:level"].to_pylist()} == {"INFO", "WARN"}
 
 
