@@ -1,4 +1,4 @@
-"""Synthetic logs with a known truth: smooth motion, ideal IMU, sensor errors, scenarios by name, writers.
+"""Synthetic logs with a known truth: motion, IMU, fixes or raw ranges, scenarios by name, writers.
 
 log = simulate(SCENARIOS["car-city"], seed=1)
 write(log, "city.mcap")
@@ -7,8 +7,11 @@ write(log, "city.mcap")
 from synthetic_logs.gnss import GnssErrors
 from synthetic_logs.imu_errors import ImuErrors
 from synthetic_logs.motion import Motion
+from synthetic_logs.receiver import Receiver
+from synthetic_logs.receiver_clock import ReceiverClock
 from synthetic_logs.scenarios import SCENARIOS
 from synthetic_logs.simulation import Journey, Scenario, SyntheticLog, ideal_imu, simulate, truth_at, with_duration
+from synthetic_logs.surroundings import Surroundings
 from synthetic_logs.writers import FORMATS, write
 
 __all__ = [
@@ -18,7 +21,10 @@ __all__ = [
     "ImuErrors",
     "Journey",
     "Motion",
+    "Receiver",
+    "ReceiverClock",
     "Scenario",
+    "Surroundings",
     "SyntheticLog",
     "ideal_imu",
     "simulate",
