@@ -51,6 +51,15 @@ def test_random_walk_bias_has_its_drive_and_is_reported():
     assert_variance(np.diff(log.accel_errors.bias[::100], axis=0), 3e-4)
 
 
+def test_gauss_markov_error_of_the_gyros_comes_on_top_of_the_bias():
+    noise = replace(SILENT, gyro_bias_std=1e-3, gyro_markov_std=2e-4, gyro_markov_tau=0.5)
+    with_error, without = (replace(STATIC, imu=ImuErrors(n)) for n in (noise, replace(noise, gyro_markov_std=0.0)))
+    error = simulate(with_error, 2).gyro_errors.bias - simulate(without, 2).gyro_errors.bias
+    assert np.mean(error**2) == pytest.approx(4e-8, rel=0.2)
+    steps = (error[1:] - np.exp(-0.02) * error[:-1]) / sqrt(1 - np.exp(-0.04))
+    assert_variance(steps, 2e-4)
+
+
 def test_turn_on_bias_has_its_spread_over_seeds():
     noise = replace(SILENT, gyro_bias_std=2e-3, accel_bias_std=0.05)
     short = replace(with_duration(STATIC, 1.0), imu=ImuErrors(noise))
