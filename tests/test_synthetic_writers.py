@@ -202,7 +202,9 @@ def test_nothing_is_overwritten(tmp_path, suffix):
 
 
 def test_paths_that_cannot_be_written_are_refused_in_one_line(tmp_path):
-    with pytest.raises(LogError, match=r"no format has the extension '.xyz'; use one of .mcap, .bag, .db3, .csv, .obs, or none"):
+    with pytest.raises(
+        LogError, match=r"no format has the extension '.xyz'; use one of .mcap, .bag, .db3, .csv, .obs, or none"
+    ):
         write(LOG, tmp_path / "log.xyz")
     (tmp_path / "file").touch()
     with pytest.raises(LogError, match="cannot be written"):
