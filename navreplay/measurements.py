@@ -5,13 +5,22 @@ from typing import NamedTuple
 import numpy as np
 
 from navreplay import earth
-from navreplay.error_models.ned import ATTITUDE, GYRO_BIAS, POSITION, VELOCITY
+from navreplay.error_models.ned import ATTITUDE, POSITION, VELOCITY, gyro_columns
 from navreplay.options import FilterOptions
 from navreplay.rotation import matrix_from_quat
 from navreplay.strapdown import NavState
 from navreplay.timeline import FixStatus, Floats, GnssFixSeries
 
-__all__ = ["FixNoise", "Measurement", "angular_rate", "fix_noise", "join", "position_measurement", "velocity_measurement"]
+__all__ = [
+    "FixNoise",
+    "Measurement",
+    "angular_rate",
+    "cross_matrix",
+    "fix_noise",
+    "join",
+    "position_measurement",
+    "velocity_measurement",
+]
 
 _AXES = ("north", "east", "down")
 
@@ -77,7 +86,7 @@ def position_measurement(state: NavState, lever_b: Floats, lla: Floats, noise: F
     difference[1] = (difference[1] + np.pi) % (2 * np.pi) - np.pi
     jacobian = np.zeros((3, size))
     jacobian[:, POSITION] = np.eye(3)
-    jacobian[:, ATTITUDE] = -_cross(lever_n)
+    jacobian[:, ATTITUDE] = -cross_matrix(lever_n)
     return Measurement(difference * metres - lever_n, jacobian, noise, ("position",) * 3, _AXES)
 
 
@@ -86,11 +95,12 @@ def velocity_measurement(
 ) -> Measurement:
     """Antenna velocity vel_n (3,) NED against the IMU's plus w x l, with rate_b (3,) of the body against the Earth [rad/s]."""
     c_nb = matrix_from_quat(state.q_nb)
-    swing_n = c_nb @ (_cross(rate_b) @ lever_b)
+    swing_n = c_nb @ (cross_matrix(rate_b) @ lever_b)
     jacobian = np.zeros((3, size))
     jacobian[:, VELOCITY] = np.eye(3)
-    jacobian[:, ATTITUDE] = -_cross(swing_n)
-    jacobian[:, GYRO_BIAS] = c_nb @ _cross(lever_b)
+    jacobian[:, ATTITUDE] = -cross_matrix(swing_n)
+    for columns in gyro_columns(size):
+        jacobian[:, columns] = c_nb @ cross_matrix(lever_b)
     return Measurement(vel_n - state.vel_n - swing_n, jacobian, noise, ("velocity",) * 3, _AXES)
 
 
@@ -113,5 +123,6 @@ def join(parts: list[Measurement]) -> Measurement:
     )
 
 
-def _cross(v: Floats) -> Floats:
+def cross_matrix(v: Floats) -> Floats:
+    """(3, 3) of the cross product with v (3,) from the left: `rotation.skew` for a single vector, ten times as fast."""
     return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])

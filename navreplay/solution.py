@@ -45,6 +45,7 @@ class InnovationSeries:
     nis: Floats
     used: NDArray[np.bool_]
     reason: tuple[str, ...]
+    sources: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

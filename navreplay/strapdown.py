@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from navreplay import _kernels
 from navreplay.timeline import Floats, ImuSeries, LogError, Times, Trajectory
 
-__all__ = ["NavState", "Steps", "find_gaps", "integrate_steps", "make_steps", "mechanise", "split_at_long_gaps"]
+__all__ = ["NavState", "Steps", "find_gaps", "idle_steps", "integrate_steps", "make_steps", "mechanise", "split_at_long_gaps"]
 
 GAP_FACTOR = 2.5
 """An interval beyond this many median intervals is a gap: one lost sample is interpolated without further notice."""
@@ -48,8 +48,8 @@ class Steps:
 class NavState:
     """Position (3,) [rad, rad, m], velocity NED (3,) [m/s], attitude q_nb (4,), gyro bias (3,) [rad/s], accelerometer bias
     (3,) [m/s^2], scale-factor errors (3,) of gyro and accelerometer [1], Gauss-Markov part of the gyro error (3,) [rad/s],
-    which adds to the gyro bias, and the receiver clock (c,): offsets [m] and, last, drift [m/s], empty without
-    ranges."""
+    which adds to the gyro bias; acceleration NED (3,) [m/s^2] where no IMU measures it; and, where ranges are used, the
+    receiver clock (c,): offsets [m] and, last, drift [m/s]."""
 
     lla: Floats
     vel_n: Floats
@@ -59,6 +59,7 @@ class NavState:
     gyro_scale: Floats
     accel_scale: Floats
     gyro_markov: Floats = field(default_factory=lambda: np.zeros(3))
+    acceleration: Floats = field(default_factory=lambda: np.zeros(3))
     clock: Floats = field(default_factory=lambda: np.zeros(0))
 
     @classmethod
@@ -67,14 +68,14 @@ class NavState:
         return cls(lla, vel_n, q_nb, np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3))
 
     def pack(self) -> Floats:
-        """(25 + c,) the layout of the kernels, the clock behind it."""
+        """(28 + c,) the layout of the kernels, and what they carry along behind it."""
         sensors = [self.gyro_bias, self.accel_bias, self.gyro_scale, self.accel_scale, self.gyro_markov]
-        return np.concatenate([self.lla, self.vel_n, self.q_nb, *sensors, self.clock])
+        return np.concatenate([self.lla, self.vel_n, self.q_nb, *sensors, self.acceleration, self.clock])
 
     @classmethod
     def unpack(cls, x: Floats) -> "NavState":
-        """The inverse of `pack`; x (25 + c,)."""
-        return cls(x[0:3], x[3:6], x[6:10], x[10:13], x[13:16], x[16:19], x[19:22], x[22:25], x[25:])
+        """The inverse of `pack`; x (28 + c,)."""
+        return cls(x[0:3], x[3:6], x[6:10], x[10:13], x[13:16], x[16:19], x[19:22], x[22:25], x[25:28], x[28:])
 
     @property
     def gyro_error(self) -> Floats:
@@ -106,6 +107,12 @@ def make_steps(imu: ImuSeries, cut_ns: Times) -> Steps:
         imu.t_ns, imu.gyro, imu.accel, imu.increments, bridged, ends, steps.dt, steps.dtheta, steps.dvel, steps.bridged
     )
     return steps
+
+
+def idle_steps(start_ns: int, t_ns: Times) -> Steps:
+    """Steps from start_ns to each of the times t_ns (k,) that carry no motion, where there is no IMU."""
+    dt = np.diff(t_ns, prepend=start_ns) / 1e9
+    return Steps(start_ns, t_ns, dt, np.zeros((len(dt), 3)), np.zeros((len(dt), 3)), np.zeros(len(dt), dtype=np.bool_))
 
 
 def integrate_steps(steps: Steps, start: NavState) -> Floats:

@@ -13,7 +13,7 @@ from navreplay.options import ImuNoise
 from navreplay.strapdown import NavState, Steps
 from navreplay.timeline import Floats
 
-__all__ = ["ACCEL_BIAS", "ATTITUDE", "GYRO_BIAS", "POSITION", "VELOCITY", "NedErrorModel", "Propagated"]
+__all__ = ["ACCEL_BIAS", "ATTITUDE", "GYRO_BIAS", "POSITION", "VELOCITY", "NedErrorModel", "Propagated", "gyro_columns"]
 
 POSITION = slice(0, 3)
 VELOCITY = slice(3, 6)
@@ -41,6 +41,11 @@ class Propagated:
     covariances: Floats
     transitions: Floats
     noises: Floats
+
+
+def gyro_columns(size: int) -> tuple[slice, ...]:
+    """The states that add to the angular rate, of a model with size error states."""
+    return (GYRO_BIAS, slice(size - 3, size)) if size in (18, 24) else (GYRO_BIAS,)
 
 
 @dataclass(frozen=True, slots=True)

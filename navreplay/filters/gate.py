@@ -1,6 +1,5 @@
 """Innovation gate: each kind of an epoch's measurement is tested by itself, and a filter shut out too long is reopened."""
 
-from collections.abc import Iterator
 from functools import cache
 from typing import NamedTuple
 
@@ -8,7 +7,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from navreplay.filters.core import Innovation, chi_square
-from navreplay.filters.record import Judged
+from navreplay.filters.record import Judged, Recorder
 from navreplay.options import GateOptions
 from navreplay.timeline import Floats
 
@@ -25,10 +24,11 @@ class Verdict(NamedTuple):
     inflation: float
     run: int
 
-    def parts(self, kinds: tuple[str, ...], innovation: Innovation, noise: Floats) -> Iterator[tuple[str, Judged]]:
-        """Per kind, its components with the verdict on them."""
+    def record(self, recorder: Recorder, t_ns: int, kinds: tuple[str, ...], innovation: Innovation, noise: Floats) -> None:
+        """Puts each kind's components into the record with the verdict on them."""
         for kind, rows in _rows_of(kinds).items():
-            yield kind, Judged(innovation.select(rows), noise[rows[:, None], rows], self.nis[kind], self.reasons[kind])
+            part = innovation.select(rows)
+            recorder.add(t_ns, kind, Judged(part, noise[rows[:, None], rows], self.nis[kind], self.reasons[kind]))
 
 
 @cache

@@ -1,6 +1,7 @@
 """Collects what happens at measurement epochs, for the report: innovations per kind, and events."""
 
 from dataclasses import dataclass, field
+from itertools import chain
 
 import numpy as np
 
@@ -8,9 +9,9 @@ from navreplay.filters.core import Innovation
 from navreplay.solution import Event, InnovationSeries
 from navreplay.timeline import Floats
 
-__all__ = ["Judged", "Recorder"]
+__all__ = ["Judged", "JudgedRows", "Recorder"]
 
-_UNITS = {"position": "m", "velocity": "m/s"}
+_UNITS = {"position": "m", "velocity": "m/s", "range": "m", "range_rate": "m/s"}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -24,12 +25,26 @@ class Judged:
     reason: str
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class JudgedRows:
+    """One kind's components at an epoch, each judged by itself: labels, residuals, variances of prediction and measurement
+    together, of the noise used and of the noise told, and reasons, each (m,)."""
+
+    labels: tuple[str, ...]
+    residual: Floats
+    variance: Floats
+    noise: Floats
+    nominal: Floats
+    reasons: tuple[str, ...]
+
+
 @dataclass(slots=True)
 class Recorder:
     """Grows while a filter runs."""
 
     times: dict[str, list[int]] = field(default_factory=dict)
     judged: dict[str, list[Judged]] = field(default_factory=dict)
+    rows: dict[str, list[JudgedRows]] = field(default_factory=dict)
     events: list[Event] = field(default_factory=list)
 
     def add(self, t_ns: int, kind: str, judged: Judged) -> None:
@@ -37,13 +52,18 @@ class Recorder:
         self.times.setdefault(kind, []).append(t_ns)
         self.judged.setdefault(kind, []).append(judged)
 
+    def add_rows(self, t_ns: int, kind: str, rows: JudgedRows) -> None:
+        """One kind's innovations at t_ns, of components that differ from epoch to epoch."""
+        self.times.setdefault(kind, []).append(t_ns)
+        self.rows.setdefault(kind, []).append(rows)
+
     def tell(self, t_ns: int, level: str, text: str) -> None:
         """An event at t_ns."""
         self.events.append(Event(t_ns, level, text))
 
     def series(self) -> tuple[InnovationSeries, ...]:
         """All innovations, a series per kind."""
-        return tuple(self._series_of(kind) for kind in self.judged)
+        return (*(self._series_of(kind) for kind in self.judged), *(self._series_of_rows(kind) for kind in self.rows))
 
     def _series_of(self, kind: str) -> InnovationSeries:
         rows = self.judged[kind]
@@ -62,4 +82,25 @@ class Recorder:
             nis=np.array([row.nis for row in rows]),
             used=np.array([not row.reason for row in rows]),
             reason=tuple(row.reason for row in rows),
+        )
+
+    def _series_of_rows(self, kind: str) -> InnovationSeries:
+        epochs = self.rows[kind]
+        counts = [len(epoch.labels) for epoch in epochs]
+        residual = np.concatenate([epoch.residual for epoch in epochs])
+        variance = np.concatenate([epoch.variance for epoch in epochs])
+        reasons = tuple(chain.from_iterable(epoch.reasons for epoch in epochs))
+        return InnovationSeries(
+            kind=kind,
+            labels=(kind.replace("_", " "),),
+            unit=_UNITS[kind],
+            t_ns=np.repeat(np.array(self.times[kind], dtype=np.int64), counts),
+            residual=residual[:, None],
+            std=np.sqrt(variance)[:, None],
+            noise_std=np.sqrt(np.concatenate([epoch.noise for epoch in epochs]))[:, None],
+            nominal_std=np.sqrt(np.concatenate([epoch.nominal for epoch in epochs]))[:, None],
+            nis=residual**2 / variance,
+            used=np.array([not reason for reason in reasons]),
+            reason=reasons,
+            sources=tuple(label.removeprefix(f"{kind} ") for epoch in epochs for label in epoch.labels),
         )

@@ -5,21 +5,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from navreplay.alignment import Alignment, align
-from navreplay.earth import move_lla
-from navreplay.error_models.ned import NedErrorModel
-from navreplay.filters.core import symmetric
+from navreplay.alignment import align
+from navreplay.error_models.error_model import ErrorModel
+from navreplay.filters.fix_aiding import FixAiding
+from navreplay.filters.gate import Gate
 from navreplay.filters.presets import Method
+from navreplay.filters.range_aiding import RangeAiding
+from navreplay.filters.range_gate import RangeGate
 from navreplay.filters.record import Recorder
-from navreplay.filters.stretches import cut_at_gaps, tell_unreached_fixes
-from navreplay.filters.update import FixUpdater
+from navreplay.filters.stretches import cut_at_gaps, tell_unreached
+from navreplay.filters.update import Updater
 from navreplay.heading import Sources
-from navreplay.measurements import FixNoise, fix_noise
 from navreplay.options import FilterOptions
-from navreplay.rotation import matrix_from_quat
 from navreplay.solution import RowStatus, Solution
-from navreplay.strapdown import NavState, make_steps
-from navreplay.timeline import Floats, GnssFixSeries, ImuSeries, LogError, Timeline, Times
+from navreplay.strapdown import NavState, Steps, idle_steps, make_steps
+from navreplay.timeline import Floats, ImuSeries, LogError, Timeline, Times
 
 __all__ = ["run_filter"]
 
@@ -36,28 +36,24 @@ class _Rows(NamedTuple):
 
 
 def run_filter(timeline: Timeline, method: Method, options: FilterOptions, progress: Progress | None = None) -> Solution:
-    """The forward solution of the IMU over a timeline.
+    """The forward solution over a timeline: of the IMU, by ranges or fixes; without IMU of the antenna, by ranges alone.
 
-    progress is called with the share done, from 0 to 1. Raises LogError without IMU or fixes, on a gap that the options
-    refuse, or when no alignment is possible.
+    progress is called with the share done, from 0 to 1. Raises LogError without anything to aid by, or without IMU where there
+    are only fixes; on a gap that the options refuse, or when no alignment is possible.
     """
-    if timeline.imu is None:
-        raise LogError("filter: the log holds no IMU channel; name it with input.imu.channel, or add the file that holds it")
-    if timeline.fixes is None:
-        raise LogError("filter: the log holds no GNSS fixes; name them with input.fix.channel, or add the file that holds them")
     recorder = Recorder()
+    if timeline.imu is None:
+        alone = _choose_ranges_alone(timeline, options, recorder)
+        rows = [_run_alone(alone, method, options, recorder, _report_of(alone.t_ns, progress))]
+        return _join(rows, f"{method.name} without IMU", alone.model, recorder)
+    aiding = _choose_aiding(timeline, options, recorder)
     stretches = cut_at_gaps(timeline.imu, options.gaps, recorder)
-    tell_unreached_fixes(timeline.fixes, stretches, recorder)
+    tell_unreached(aiding.t_ns, aiding.name, stretches, recorder)
+    report = _report_of(timeline.imu.t_ns, progress)
     rows = []
-    begin, span = int(timeline.imu.t_ns[0]), int(timeline.imu.t_ns[-1] - timeline.imu.t_ns[0])
-
-    def report(t_ns: int) -> None:
-        if progress is not None:
-            progress((t_ns - begin) / span)
-
     for stretch in stretches:
         try:
-            rows.append(_run_stretch(timeline, timeline.fixes, stretch, method, options, recorder, report))
+            rows.append(_run_stretch(timeline, aiding, stretch, method, options, recorder, report))
         except LogError as error:
             if len(stretches) == 1:
                 raise
@@ -66,10 +62,42 @@ def run_filter(timeline: Timeline, method: Method, options: FilterOptions, progr
         report(int(stretch.t_ns[-1]))
     if not rows:
         raise LogError("filter: no stretch of the IMU could be aligned; see the gaps that `navreplay inspect` shows")
-    return _join(rows, method, NedErrorModel(options.imu_noise), recorder)
+    return _join(rows, method.name, aiding.model, recorder)
 
 
-def _join(rows: list[_Rows], method: Method, model: NedErrorModel, recorder: Recorder) -> Solution:
+def _report_of(t_ns: Times, progress: Progress | None) -> Callable[[int], None]:
+    begin, span = int(t_ns[0]), max(int(t_ns[-1] - t_ns[0]), 1)
+
+    def report(now_ns: int) -> None:
+        if progress is not None:
+            progress((now_ns - begin) / span)
+
+    return report
+
+
+def _choose_aiding(timeline: Timeline, options: FilterOptions, recorder: Recorder) -> FixAiding | RangeAiding:
+    ranges = timeline.ranges if options.use != "fixes" else None
+    if ranges is not None:
+        return RangeAiding(ranges, timeline.fix_lever_b, True, options, recorder)
+    if options.use == "ranges":
+        raise LogError("filter: filter.use is 'ranges', but the log holds none; set it to 'auto', or add the file that does")
+    if timeline.fixes is None:
+        raise LogError("filter: the log holds no GNSS fixes; name them with input.fix.channel, or add the file that holds them")
+    return FixAiding(timeline.fixes, timeline.fix_lever_b, options)
+
+
+def _choose_ranges_alone(timeline: Timeline, options: FilterOptions, recorder: Recorder) -> RangeAiding:
+    if timeline.ranges is None or options.use == "fixes":
+        raise LogError("filter: the log holds no IMU channel; name it with input.imu.channel, or add the file that holds it")
+    text = (
+        "the log holds no IMU: the solution is that of a GNSS-only filter and describes the antenna, its yaw is the course, "
+        "its roll and pitch are unknown"
+    )
+    recorder.tell(int(timeline.ranges.t_ns[0]), "warning", text)
+    return RangeAiding(timeline.ranges, timeline.fix_lever_b, False, options, recorder)
+
+
+def _join(rows: list[_Rows], method: str, model: ErrorModel, recorder: Recorder) -> Solution:
     states = np.concatenate([row.states for row in rows])
     return Solution(
         t_ns=np.concatenate([row.t_ns for row in rows]),
@@ -82,7 +110,7 @@ def _join(rows: list[_Rows], method: Method, model: NedErrorModel, recorder: Rec
         status=np.concatenate([row.status for row in rows]),
         state_names=model.names,
         state_units=model.units,
-        method=method.name,
+        method=method,
         innovations=recorder.series(),
         events=tuple(sorted(recorder.events, key=lambda event: event.t_ns)),
     )
@@ -90,32 +118,58 @@ def _join(rows: list[_Rows], method: Method, model: NedErrorModel, recorder: Rec
 
 def _run_stretch(
     timeline: Timeline,
-    fixes: GnssFixSeries,
+    aiding: FixAiding | RangeAiding,
     imu: ImuSeries,
     method: Method,
     options: FilterOptions,
     recorder: Recorder,
     report: Callable[[int], None],
 ) -> _Rows:
-    start = align(Sources(imu, fixes, timeline.attitude, timeline.reference, options.imu_noise, options.alignment))
+    start = align(Sources(imu, aiding.fixes, timeline.attitude, timeline.reference, options.imu_noise, options.alignment))
     recorder.tell(start.t_ns, "info", start.text)
     for warning in start.warnings:
         recorder.tell(start.t_ns, "warning", warning)
-    noise = fix_noise(fixes, options)
-    model = NedErrorModel(options.imu_noise)
-    updater = FixUpdater(fixes, noise, timeline.fix_lever_b, model, method, options, recorder)
-    state, cov = _initial(model, fixes, noise, start, timeline.fix_lever_b)
-
-    epochs = np.flatnonzero((fixes.t_ns > start.t_ns) & (fixes.t_ns <= imu.t_ns[-1]))
-    nodes = np.union1d(fixes.t_ns[epochs], _output_times(start.t_ns, int(imu.t_ns[-1]), options.output_rate))
+    state, cov = aiding.start(start)
+    gate = Gate(options.gate) if isinstance(aiding, FixAiding) else RangeGate(options.gate)
+    updater = Updater(aiding, gate, aiding.model, method, recorder)
+    epochs = np.flatnonzero((aiding.t_ns > start.t_ns) & (aiding.t_ns <= imu.t_ns[-1]))
+    nodes = np.union1d(aiding.t_ns[epochs], _output_times(start.t_ns, int(imu.t_ns[-1]), options.output_rate))
     steps = make_steps(imu, np.append(nodes, start.t_ns)).after(start.t_ns)
+    return _run_epochs(steps, nodes, aiding.t_ns, epochs, state, cov, updater, aiding.model, options, report)
+
+
+def _run_alone(
+    aiding: RangeAiding, method: Method, options: FilterOptions, recorder: Recorder, report: Callable[[int], None]
+) -> _Rows:
+    start_ns, state, cov = aiding.start_alone()
+    updater = Updater(aiding, RangeGate(options.gate), aiding.model, method, recorder)
+    epochs = np.flatnonzero(aiding.t_ns > start_ns)
+    nodes = np.union1d(aiding.t_ns[epochs], _output_times(start_ns, int(aiding.t_ns[-1]), options.output_rate))
+    return _run_epochs(
+        idle_steps(start_ns, nodes), nodes, aiding.t_ns, epochs, state, cov, updater, aiding.model, options, report
+    )
+
+
+def _run_epochs(
+    steps: Steps,
+    nodes: Times,
+    t_ns: Times,
+    epochs: np.ndarray,
+    state: NavState,
+    cov: Floats,
+    updater: Updater,
+    model: ErrorModel,
+    options: FilterOptions,
+    report: Callable[[int], None],
+) -> _Rows:
+    """From state and cov (n, n) at the beginning of the steps over all nodes (k,), with updates at t_ns[epochs]."""
     ends = np.searchsorted(steps.t_ns, nodes) + 1
-    rows = _allocate(np.concatenate([[start.t_ns], nodes]).astype(np.int64), len(state.pack()), model.size)
+    rows = _allocate(np.concatenate([[steps.start_ns], nodes]).astype(np.int64), len(state.pack()), model.size)
     rows.states[0], rows.covariances[0], rows.status[0] = state.pack(), cov, RowStatus.UPDATED
 
     # each epoch ends a run of nodes; behind the last epoch one more run may follow, without a measurement
     node, step = 0, 0
-    stops = (np.searchsorted(nodes, fixes.t_ns[epochs]) + 1).tolist()
+    stops = (np.searchsorted(nodes, t_ns[epochs]) + 1).tolist()
     for epoch, stop in zip([*epochs.tolist(), None], [*stops, len(nodes)], strict=True):
         if stop > node:
             moved = model.propagate(state, cov, steps, step, ends[node:stop], options.covariance_interval)
@@ -125,7 +179,7 @@ def _run_stretch(
         if epoch is not None:
             state, cov, status = updater.update(epoch, state, cov, steps.dtheta[step - 1], float(steps.dt[step - 1]))
             rows.states[node], rows.covariances[node], rows.status[node] = state.pack(), cov, status
-            report(int(fixes.t_ns[epoch]))
+            report(int(t_ns[epoch]))
     return rows
 
 
@@ -140,19 +194,3 @@ def _allocate(t_ns: Times, width: int, size: int) -> _Rows:
     k = len(t_ns)
     status = np.full(k, RowStatus.PREDICTED, dtype=np.int8)
     return _Rows(t_ns, np.empty((k, width)), np.empty((k, size, size)), status)
-
-
-def _initial(
-    model: NedErrorModel, fixes: GnssFixSeries, noise: FixNoise, start: Alignment, lever_b: Floats
-) -> tuple[NavState, Floats]:
-    at = start.fix
-    lever_n = matrix_from_quat(start.q_nb) @ lever_b
-    known = bool(fixes.has_velocity[at])
-    velocity = fixes.vel_n[at] if known else start.vel_n
-    cov_vel = noise.velocity[at] if known else np.eye(3) * start.vel_std**2
-    zero = np.zeros(3)
-    state = NavState(move_lla(fixes.lla[at], -lever_n), velocity.copy(), start.q_nb, start.gyro_bias, zero, zero, zero)
-    cov = model.initial_covariance(noise.position[at], cov_vel, start.cov_att, start.gyro_bias_std)
-    if start.levelled:
-        cov = model.tie_tilt_to_accel_bias(cov, start.q_nb)
-    return state, symmetric(cov)

@@ -5,9 +5,9 @@ import numpy as np
 from navreplay.filters.record import Recorder
 from navreplay.options import GapOptions
 from navreplay.strapdown import find_gaps, split_at_long_gaps
-from navreplay.timeline import GnssFixSeries, ImuSeries, LogError
+from navreplay.timeline import ImuSeries, LogError, Times
 
-__all__ = ["cut_at_gaps", "tell_unreached_fixes"]
+__all__ = ["cut_at_gaps", "tell_unreached"]
 
 
 def cut_at_gaps(imu: ImuSeries, options: GapOptions, recorder: Recorder) -> list[ImuSeries]:
@@ -34,13 +34,13 @@ def cut_at_gaps(imu: ImuSeries, options: GapOptions, recorder: Recorder) -> list
     return stretches
 
 
-def tell_unreached_fixes(fixes: GnssFixSeries, stretches: list[ImuSeries], recorder: Recorder) -> None:
-    """Records how many fixes no stretch covers."""
-    reached = np.zeros(len(fixes), dtype=bool)
+def tell_unreached(t_ns: Times, name: str, stretches: list[ImuSeries], recorder: Recorder) -> None:
+    """Records how many of the epochs t_ns (e,), called name, no stretch covers."""
+    reached = np.zeros(len(t_ns), dtype=bool)
     for imu in stretches:
-        reached |= (fixes.t_ns >= imu.t_ns[0]) & (fixes.t_ns <= imu.t_ns[-1])
+        reached |= (t_ns >= imu.t_ns[0]) & (t_ns <= imu.t_ns[-1])
     if not reached.all():
         count = int((~reached).sum())
-        first = int(fixes.t_ns[np.argmin(reached)])
-        text = f"{count} of {len(fixes)} fixes lie outside the IMU's time span or in its gaps; they are not used"
+        first = int(t_ns[np.argmin(reached)])
+        text = f"{count} of {len(t_ns)} {name} lie outside the IMU's time span or in its gaps; they are not used"
         recorder.tell(first, "warning", text)

@@ -1,0 +1,75 @@
+"""An error model and a receiver clock side by side: tightly coupled, as in Ge et al., Sensors 20 (2020) 6041, (1)-(6).
+
+Their 20 states are those of `NedErrorModel` with a Gauss-Markov gyro error, and a clock of one offset and its drift. Motion and
+clock are driven by independent noise, so that each part moves by its own transition and only their covariance is shared.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from navreplay.error_models.error_model import ErrorModel
+from navreplay.error_models.ned import Propagated
+from navreplay.error_models.receiver_clock import ReceiverClock
+from navreplay.strapdown import NavState, Steps
+from navreplay.timeline import Floats
+
+__all__ = ["ClockedModel"]
+
+
+@dataclass(frozen=True, slots=True)
+class ClockedModel:
+    """The states of motion (n of them) and, behind them, those of the clock (c)."""
+
+    motion: ErrorModel
+    clock: ReceiverClock
+
+    @property
+    def size(self) -> int:
+        """Number of error states n + c."""
+        return self.motion.size + self.clock.size
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """(n + c,) names of the error states."""
+        return self.motion.names + self.clock.names
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """(n + c,) units of the error states."""
+        return self.motion.units + self.clock.units
+
+    def retract(self, state: NavState, correction: Floats) -> NavState:
+        """The state moved by an estimated error (n + c,), true minus computed."""
+        n = self.motion.size
+        return replace(self.motion.retract(state, correction[:n]), clock=state.clock + correction[n:])
+
+    def propagate(
+        self, state: NavState, cov: Floats, steps: Steps, first: int, ends: np.ndarray, interval: float, keep: bool = False
+    ) -> Propagated:
+        """From state and cov (n + c, n + c) before step `first` to the nodes behind ends (k,) steps, counted from the first."""
+        n, k = self.motion.size, len(ends)
+        moved = self.motion.propagate(state, cov[:n, :n], steps, first, ends, interval, keep=True)
+        elapsed = np.concatenate([[0.0], np.cumsum(steps.dt[first : int(ends[-1])])])[ends - first]
+        dt = np.diff(elapsed, prepend=0.0)
+        phi, q = self.clock.transitions(dt), self.clock.noises(dt)
+        covariances = np.empty((k, self.size, self.size))
+        cross, clock_cov, clock = cov[:n, n:], cov[n:, n:], state.clock
+        for i in range(k):
+            cross = moved.transitions[i] @ cross @ phi[i].T
+            clock_cov = phi[i] @ clock_cov @ phi[i].T + q[i]
+            clock = phi[i] @ clock
+            covariances[i, :n, n:], covariances[i, n:, :n], covariances[i, n:, n:] = cross, cross.T, clock_cov
+            moved.states[i, -len(clock) :] = clock
+        covariances[:, :n, :n] = moved.covariances
+        if not keep:
+            return Propagated(moved.states, covariances, moved.transitions[:0], moved.noises[:0])
+        return Propagated(moved.states, covariances, _side_by_side(moved.transitions, phi), _side_by_side(moved.noises, q))
+
+
+def _side_by_side(motion: Floats, clock: Floats) -> Floats:
+    """Block-diagonal (k, n + c, n + c) of (k, n, n) and (k, c, c)."""
+    n, c = motion.shape[1], clock.shape[1]
+    both = np.zeros((len(motion), n + c, n + c))
+    both[:, :n, :n], both[:, n:, n:] = motion, clock
+    return both

@@ -1,0 +1,40 @@
+"""What the epoch loop asks of an error model."""
+
+from typing import Protocol
+
+import numpy as np
+
+from navreplay.error_models.ned import Propagated
+from navreplay.strapdown import NavState, Steps
+from navreplay.timeline import Floats
+
+__all__ = ["ErrorModel"]
+
+
+class ErrorModel(Protocol):
+    """A state layout whose first nine elements are position NED [m], velocity NED [m/s] and rotation vector in n [rad]."""
+
+    @property
+    def size(self) -> int:
+        """Number of error states n."""
+        ...
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """(n,) names of the error states."""
+        ...
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """(n,) units of the error states."""
+        ...
+
+    def retract(self, state: NavState, correction: Floats) -> NavState:
+        """The state moved by an estimated error (n,), true minus computed."""
+        ...
+
+    def propagate(
+        self, state: NavState, cov: Floats, steps: Steps, first: int, ends: np.ndarray, interval: float, keep: bool = False
+    ) -> Propagated:
+        """From state and cov (n, n) before step `first` to the nodes behind ends (k,) steps, counted from the first of all."""
+        ...

@@ -1,0 +1,69 @@
+"""Aiding by GNSS fixes: loosely coupled."""
+
+import numpy as np
+
+from navreplay.alignment import Alignment
+from navreplay.earth import move_lla
+from navreplay.error_models.ned import NedErrorModel
+from navreplay.filters.core import symmetric
+from navreplay.filters.update import Observed
+from navreplay.measurements import FixNoise, angular_rate, fix_noise, join, position_measurement, velocity_measurement
+from navreplay.options import FilterOptions
+from navreplay.rotation import matrix_from_quat
+from navreplay.strapdown import NavState
+from navreplay.timeline import Floats, GnssFixSeries, Times
+
+__all__ = ["FixAiding", "start_at_fix"]
+
+
+class FixAiding:
+    """Positions and velocities of the antenna, with their told noise."""
+
+    name = "fixes"
+
+    def __init__(self, fixes: GnssFixSeries, lever_b: Floats, options: FilterOptions) -> None:
+        self.fixes = fixes
+        self.model = NedErrorModel(options.imu_noise)
+        self._noise = fix_noise(fixes, options)
+        self._lever_b = lever_b
+        self._has_position = fixes.has_position
+        self._has_velocity = fixes.has_velocity & options.use_velocity
+
+    @property
+    def t_ns(self) -> Times:
+        """(e,) times of the fixes."""
+        return self.fixes.t_ns
+
+    def start(self, alignment: Alignment) -> tuple[NavState, Floats]:
+        """State and covariance (n, n) at the alignment's fix."""
+        return start_at_fix(self.model, self.fixes, self._noise, alignment, self._lever_b)
+
+    def observe(self, epoch: int, state: NavState, cov: Floats, dtheta: Floats, dt: float) -> Observed:
+        """The fix with index epoch, of what it holds."""
+        parts = []
+        size = self.model.size
+        if self._has_position[epoch]:
+            lla, noise = self.fixes.lla[epoch], self._noise.position[epoch]
+            parts.append(position_measurement(state, self._lever_b, lla, noise, size))
+        if self._has_velocity[epoch]:
+            rate = angular_rate(state, dtheta, dt)
+            vel_n, noise = self.fixes.vel_n[epoch], self._noise.velocity[epoch]
+            parts.append(velocity_measurement(state, self._lever_b, rate, vel_n, noise, size))
+        return Observed(join(parts) if parts else None, state, cov)
+
+
+def start_at_fix(
+    model: NedErrorModel, fixes: GnssFixSeries, noise: FixNoise, start: Alignment, lever_b: Floats
+) -> tuple[NavState, Floats]:
+    """State and covariance (n, n) of an IMU that is lever_b (3,) [m] before the antenna whose fix it is aligned at."""
+    at = start.fix
+    lever_n = matrix_from_quat(start.q_nb) @ lever_b
+    known = bool(fixes.has_velocity[at])
+    velocity = fixes.vel_n[at] if known else start.vel_n
+    cov_vel = noise.velocity[at] if known else np.eye(3) * start.vel_std**2
+    zero = np.zeros(3)
+    state = NavState(move_lla(fixes.lla[at], -lever_n), velocity.copy(), start.q_nb, start.gyro_bias, zero, zero, zero)
+    cov = model.initial_covariance(noise.position[at], cov_vel, start.cov_att, start.gyro_bias_std)
+    if start.levelled:
+        cov = model.tie_tilt_to_accel_bias(cov, start.q_nb)
+    return state, symmetric(cov)

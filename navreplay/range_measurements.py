@@ -1,0 +1,98 @@
+"""Pseudoranges and range rates against a predicted state: residuals, Jacobians, noise.
+
+Groves (2013), 9.2 and 14.3.2. Satellite positions are in Earth-fixed axes of the time of reception, turned for the signal's
+flight, so that distances need no Sagnac term; with velocities in the same axes neither do the rates (what the flight time's
+own change adds stays below 6 mm/s).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navreplay import earth
+from navreplay.error_models.ned import ATTITUDE, POSITION, VELOCITY, gyro_columns
+from navreplay.measurements import Measurement, cross_matrix
+from navreplay.range_epochs import RangeEpochs
+from navreplay.rotation import matrix_from_quat
+from navreplay.strapdown import NavState
+from navreplay.timeline import Floats
+
+__all__ = ["Antenna", "carried_antenna", "free_antenna", "range_measurement"]
+
+
+class Antenna(NamedTuple):
+    """Where the antenna is and moves: pos_e (3,) [m, Earth-fixed], c_en (3, 3), vel_n (3,) [m/s], and the Jacobians (3, n) of
+    its position and velocity, NED, against the states of motion."""
+
+    pos_e: Floats
+    c_en: Floats
+    vel_n: Floats
+    position_jacobian: Floats
+    velocity_jacobian: Floats
+
+
+def carried_antenna(state: NavState, lever_b: Floats, rate_b: Floats, size: int) -> Antenna:
+    """The antenna lever_b (3,) [m] off the IMU of a body that turns with rate_b (3,) [rad/s] against the Earth."""
+    c_nb = matrix_from_quat(state.q_nb)
+    c_en = earth.matrix_en(state.lla[0], state.lla[1])
+    lever_n = c_nb @ lever_b
+    swing_n = c_nb @ (cross_matrix(rate_b) @ lever_b)
+    position = np.zeros((3, size))
+    position[:, POSITION] = np.eye(3)
+    position[:, ATTITUDE] = -cross_matrix(lever_n)
+    velocity = np.zeros((3, size))
+    velocity[:, VELOCITY] = np.eye(3)
+    velocity[:, ATTITUDE] = -cross_matrix(swing_n)
+    for columns in gyro_columns(size):
+        velocity[:, columns] = c_nb @ cross_matrix(lever_b)
+    pos_e = earth.ecef_from_lla(state.lla) + c_en @ lever_n
+    return Antenna(pos_e, c_en, state.vel_n + swing_n, position, velocity)
+
+
+def free_antenna(state: NavState, size: int) -> Antenna:
+    """The antenna where the state itself is the antenna's."""
+    position, velocity = np.zeros((3, size)), np.zeros((3, size))
+    position[:, POSITION] = velocity[:, VELOCITY] = np.eye(3)
+    c_en = earth.matrix_en(state.lla[0], state.lla[1])
+    return Antenna(earth.ecef_from_lla(state.lla), c_en, state.vel_n, position, velocity)
+
+
+def range_measurement(
+    antenna: Antenna, clock: Floats, epochs: RangeEpochs, rows: slice, variances: tuple[Floats, Floats]
+) -> Measurement:
+    """Rows of corrected epochs against the antenna and the clock (c,): all pseudoranges (kind ``range``), then all range rates
+    that are known (``range_rate``), labelled by satellite.
+
+    variances: of pseudoranges and rates of all rows (n,). Residuals in m and m/s. The states are those of motion, then the
+    clock's.
+    """
+    group = epochs.group[rows]
+    rated = np.flatnonzero(np.isfinite(epochs.range_rate[rows]))
+    towards_n = (epochs.sat_pos_e[rows] - antenna.pos_e) @ antenna.c_en
+    distance = np.sqrt((towards_n**2).sum(axis=1))
+    sight = towards_n / distance[:, None]
+    approach_n = epochs.sat_vel_e[rows][rated] @ antenna.c_en - antenna.vel_n
+    rate = (sight[rated] * approach_n).sum(axis=1)
+    m, n = len(distance), antenna.position_jacobian.shape[1]
+    jacobian = np.zeros((m + len(rated), n + len(clock)))
+    jacobian[:m, :n] = -sight @ antenna.position_jacobian
+    jacobian[np.arange(m), n + group] = 1.0
+    # the line of sight itself turns with position
+    turning = (approach_n - sight[rated] * rate[:, None]) / distance[rated, None]
+    jacobian[m:, :n] = -sight[rated] @ antenna.velocity_jacobian - turning @ antenna.position_jacobian
+    jacobian[m:, -1] = 1.0
+    residual = np.concatenate(
+        [
+            epochs.pseudorange[rows] - distance - clock[group],
+            epochs.range_rate[rows][rated] - rate - clock[-1],
+        ]
+    )
+    noise = np.zeros((m + len(rated), m + len(rated)))
+    noise.flat[:: m + len(rated) + 1] = np.concatenate([variances[0][rows], variances[1][rows][rated]])
+    return Measurement(residual, jacobian, noise, ("range",) * m + ("range_rate",) * len(rated), _labels(epochs, rows, rated))
+
+
+def _labels(epochs: RangeEpochs, rows: slice, rated: NDArray[np.intp]) -> tuple[str, ...]:
+    satellites = epochs.sat[rows].tolist()
+    return (*satellites, *(satellites[i] for i in rated.tolist()))
