@@ -66,14 +66,14 @@ _BUILDINGS = Surroundings(
     320.0,
     roof_elevation=68 * _DEG,
     attenuation=2.0,
-    multipath_std=5.0,
-    rate_multipath_std=0.25,
+    multipath_std=4.0,
+    rate_multipath_std=0.2,
     reflected_share=0.3,
     reflected_attenuation=8.0,
-    reflected_bias=12.0,
-    reflected_rate_std=0.6,
+    reflected_bias=8.0,
+    reflected_rate_std=0.4,
     outlier_probability=0.05,
-    outlier_std=30.0,
+    outlier_std=25.0,
     outlier_rate_std=3.0,
 )
 _ROUND_S = 600.0
@@ -90,7 +90,7 @@ _CITY = Receiver(
     multipath_std=0.5,
     rate_multipath_std=0.02,
     surroundings=_repeat(3, _FOLIAGE, _BUILDINGS),
-    ionosphere_mismatch=0.3,
+    ionosphere_mismatch=0.2,
     troposphere_mismatch=0.05,
     system_offset_std=10.0,
 )
