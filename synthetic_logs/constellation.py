@@ -117,10 +117,10 @@ _SHELLS = (
 def arrange_constellation(systems: str, reference_ns: int) -> Orbits:
     """The satellites of some systems, such as ``GEC``, with elements for reference_ns [GPS ns]; its arrays are read-only.
 
-    The same arrangement over the ground at every reference time. Raises KeyError for an unknown system.
+    In the order of their names; the same arrangement over the ground at every reference time. Raises KeyError for an unknown system.
     """
     shells = {shell.system: shell for shell in _SHELLS}
-    parts = [_arrange_shell(shells[system], reference_ns) for system in systems]
+    parts = [_arrange_shell(shells[system], reference_ns) for system in sorted(systems)]
     columns = [field.name for field in fields(Orbits) if field.name != "reference_ns"]
     joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in columns}
     for column in joined.values():
