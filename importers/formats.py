@@ -10,8 +10,11 @@ from importers.csv_mapping import find_mapping, read_mapped
 from importers.kf_gins import find_kf_gins, read_gnss, read_imu
 from importers.log import Log
 from importers.nmea import is_nmea, read_nmea
+from importers.rinex_navigation import is_rinex_navigation, read_rinex_navigation
+from importers.rinex_observation import is_rinex_observation, read_rinex_observation
 from importers.rtklib_pos import is_pos, read_pos
 from importers.settings import InputSettings
+from importers.sp3 import is_sp3, read_sp3
 from importers.text_log import TextLog
 from importers.tum import is_tum, read_tum
 from navreplay.timeline import LogError
@@ -130,6 +133,25 @@ def _open_kf_gins(path: str, head: bytes, settings: InputSettings) -> Log | None
     return TextLog(path, "kf-gins", layout, lambda: read(path, settings.gps_week))
 
 
+def _open_rinex_observation(path: str, head: bytes, settings: InputSettings) -> Log | None:
+    if not is_rinex_observation(_text(head)):
+        return None
+    leap = leap_seconds(settings.leap_seconds)
+    return TextLog(path, "rinex", "rinex/observation", lambda: read_rinex_observation(path, settings.range, leap))
+
+
+def _open_rinex_navigation(path: str, head: bytes, settings: InputSettings) -> Log | None:
+    if not is_rinex_navigation(_text(head)):
+        return None
+    return TextLog(path, "rinex", "rinex/navigation", lambda: read_rinex_navigation(path, leap_seconds(settings.leap_seconds)))
+
+
+def _open_sp3(path: str, head: bytes, settings: InputSettings) -> Log | None:
+    if not is_sp3(_text(head)):
+        return None
+    return TextLog(path, "sp3", "sp3", lambda: read_sp3(path, leap_seconds(settings.leap_seconds)))
+
+
 def _open_tum(path: str, head: bytes, settings: InputSettings) -> Log | None:
     return TextLog(path, "tum", "tum", lambda: read_tum(path)) if is_tum(_text(head)) else None
 
@@ -143,6 +165,9 @@ FORMATS: tuple[Format, ...] = (
     Format("pos", "RTKLIB position file", (".pos",), _open_pos),
     Format("nmea", "NMEA 0183 (GGA and RMC)", (".nmea", ".gga"), _open_nmea),
     Format("kf-gins", "KF-GINS text: IMU increments, GNSS positions", (".txt",), _open_kf_gins),
+    Format("rinex", "RINEX 3 or 4 observations: pseudoranges", (".rnx", ".obs"), _open_rinex_observation),
+    Format("rinex-nav", "RINEX 3 or 4 navigation: ephemerides", (".rnx", ".nav"), _open_rinex_navigation),
+    Format("sp3", "SP3 precise orbits and clocks", (".sp3",), _open_sp3),
     Format("tum", "TUM trajectory, as a reference", (".tum", ".txt"), _open_tum),
 )
 """In the order in which they are tried."""

@@ -14,7 +14,7 @@ from importers.log import Channel, Log, Table
 from importers.messages import find_kind, stamp_column
 from importers.preflight import preflight
 from importers.range_conversion import flat_source
-from importers.selection import SETTING, Choice, candidates, choose_role
+from importers.selection import SETTING, Choice, always_used, candidates, choose_role
 from importers.settings import AttitudeInput, FixInput, ImuInput, InputSettings, ReferenceInput
 from importers.sources import Clock, Source, join_sources
 from navreplay.time_scales import LeapSeconds, gps_from_utc
@@ -101,7 +101,7 @@ def _implied(open_choices: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:
 def _choose(
     logs: Sequence[Log], settings: InputSettings, reference: Log | None, findings: list[Finding]
 ) -> tuple[list[Choice], dict[str, tuple[str, ...]]]:
-    chosen: list[Choice] = [*candidates(logs, "time")]
+    chosen: list[Choice] = always_used(logs)
     open_choices: dict[str, tuple[str, ...]] = {}
     for role in SETTING:
         try:
@@ -169,6 +169,8 @@ def _times(log: Log, channel: Channel, table: Table, role: str | None, settings:
     if role == "time" or len(table.log_time_ns) == 0:
         return np.sort(gps_from_utc(table.log_time_ns, leap_seconds(settings.leap_seconds)))
     source = Source(log.path, channel, table, role or "unused")
+    if role == "ephemeris":
+        return np.sort(table.columns.get("t_gps_ns", table.log_time_ns))
     if (kind := find_kind(channel.type)) is not None and "range" in kind.roles:
         return np.unique(flat_source(source).table.log_time_ns)
     return np.sort(

@@ -1,13 +1,12 @@
 """Loading logs into one timeline."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
 
 from importers.clock import leap_seconds
-from importers.ephemeris import join_ephemerides
 from importers.fix_conversion import convert_fixes
 from importers.formats import open_log
 from importers.imu_conversion import convert_imu
@@ -17,7 +16,7 @@ from importers.reference_conversion import convert_attitude, convert_reference, 
 from importers.selection import Choice, choose_channels
 from importers.settings import InputSettings
 from importers.sources import Clock, Source, join_sources
-from navreplay.timeline import ChannelUse, LogError, Provenance, SourceFile, Timeline
+from navreplay.timeline import ChannelUse, LogError, Provenance, RangeSeries, SourceFile, Timeline
 
 __all__ = ["build_timeline", "describe_file", "load_timeline", "open_logs"]
 
@@ -51,10 +50,10 @@ def load_timeline(
 
 
 def open_logs(paths: Sequence[str | Path], settings: InputSettings) -> list[Log]:
-    """The logs, each file once. Raises LogError."""
+    """The logs, each file once, and the navigation files that the settings name. Raises LogError."""
     if not paths:
         raise LogError("no log was named")
-    return [open_log(path, settings) for path in dict.fromkeys(str(path) for path in paths)]
+    return [open_log(path, settings) for path in dict.fromkeys(str(path) for path in (*paths, *settings.range.navigation))]
 
 
 def build_timeline(
@@ -77,7 +76,7 @@ def build_timeline(
         fixes, told, assumed = convert_fixes(position, velocity, settings.fix)
         uses, notes = [*uses, *told], [*notes, *assumed]
     if "range" in sources:
-        ranges, told, assumed = convert_ranges(sources["range"], join_ephemerides([]), settings.range)
+        ranges, told, assumed = _ranges(sources, settings, clock)
         uses, notes = [*uses, *told], [*notes, *assumed]
     if "attitude" in sources:
         attitude, told, assumed = convert_attitude(
@@ -106,6 +105,18 @@ def build_timeline(
 
 
 _GNSS = ("fix", "velocity")
+
+
+def _ranges(
+    sources: Mapping[str, list[Source]], settings: InputSettings, clock: Clock
+) -> tuple[RangeSeries | None, Sequence[ChannelUse], Sequence[str]]:
+    """Raw ranges; None, and why, where they are of no use but were not asked for and there are fixes."""
+    try:
+        return convert_ranges(sources["range"], sources.get("ephemeris", []), settings.range, clock.leap)
+    except LogError as error:
+        if "fix" not in sources or settings.range.channel is not None:
+            raise
+        return None, (), (f"{error}; so its ranges are not used",)
 
 
 def describe_file(log: Log) -> SourceFile:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from importers.ephemeris_messages import EPHEMERIS_TYPES
 from importers.log import Table
 from importers.nmea import NMEA_NOTE
 from importers.range_messages import RANGE_TYPES
@@ -158,6 +159,7 @@ def _mapped(columns: Mapping[str, np.ndarray]) -> Rows:
 
 
 _FIX = ("fix", "reference")
+_RAW_GNSS = {"range": RANGE_TYPES, "ephemeris": EPHEMERIS_TYPES}
 _POSE = ("reference", "attitude")
 _MSL_NOTE = "heights of the fixes are taken as ellipsoidal, as NavSatFix defines them; some drivers give mean sea level"
 
@@ -193,4 +195,4 @@ KINDS: dict[str, Kind] = {
     "csv/velocity": Kind(("velocity",), _mapped),
     "csv/attitude": Kind(("attitude",), _mapped),
     "csv/reference": Kind(("reference",), _mapped),
-} | {type: Kind(("range",), _no_rows) for type in RANGE_TYPES}
+} | {type: Kind((role,), _no_rows) for role, types in _RAW_GNSS.items() for type in types}

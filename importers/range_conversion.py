@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from importers.ephemeris import Ephemerides
+from importers.ephemeris_sources import read_ephemerides
 from importers.flight_rotation import turn_to_reception
 from importers.range_messages import range_table
 from importers.range_rows import Applied, RangeRows, join_range_rows, range_rows
@@ -15,6 +16,7 @@ from importers.screening import Screening
 from importers.settings import RangeInput
 from importers.signals import SPEED_OF_LIGHT, rank_signals
 from importers.sources import Joined, Source, account
+from navreplay.time_scales import LeapSeconds
 from navreplay.timeline import ChannelUse, Floats, LogError, RangeSeries
 
 __all__ = ["convert_ranges", "flat_source"]
@@ -36,7 +38,7 @@ def flat_source(source: Source) -> Source:
 
 
 def convert_ranges(
-    sources: Sequence[Source], ephemerides: Ephemerides, settings: RangeInput
+    sources: Sequence[Source], ephemeris_sources: Sequence[Source], settings: RangeInput, leap: LeapSeconds
 ) -> tuple[RangeSeries, tuple[ChannelUse, ...], tuple[str, ...]]:
     """The series, its accounting, and what was assumed. Raises LogError where no pseudorange is usable."""
     flat = [flat_source(source) for source in sources]
@@ -44,6 +46,8 @@ def convert_ranges(
     name, n = flat[0].channel.name, len(rows.t_ns)
     ends = np.cumsum([len(source.table.log_time_ns) for source in flat])
     parts = tuple(slice(int(end) - len(source.table.log_time_ns), int(end)) for end, source in zip(ends, flat, strict=True))
+    near_ns = int(np.median(rows.t_ns)) if n else 0
+    ephemerides, uses = read_ephemerides(ephemeris_sources, near_ns, leap)
     joined = Joined(name, rows.t_ns, Rows(), tuple(flat), parts, ())
     notes: list[str] = []
     if settings.time_offset_s:
@@ -60,7 +64,7 @@ def convert_ranges(
     chosen = RangeRows(**{field: getattr(rows, field)[order] for field in RangeRows.__slots__})
     klobuchar = _klobuchar(flat, ephemerides)
     series, told = _build(name, chosen, klobuchar)
-    return series, account(joined, screening), (*notes, *told)
+    return series, (*account(joined, screening), *uses), (*notes, *told)
 
 
 def _screen(screening: Screening, rows: RangeRows, settings: RangeInput) -> None:

@@ -9,7 +9,7 @@ from importers.messages import find_kind
 from importers.settings import InputSettings
 from navreplay.timeline import LogError
 
-__all__ = ["NOTHING", "SETTING", "Choice", "candidates", "choose_channels", "choose_role"]
+__all__ = ["NOTHING", "SETTING", "Choice", "always_used", "candidates", "choose_channels", "choose_role"]
 
 SETTING = {
     "imu": "input.imu.channel",
@@ -48,7 +48,12 @@ def candidates(logs: Sequence[Log], role: str) -> list[Choice]:
 def choose_channels(logs: Sequence[Log], settings: InputSettings, reference: Log | None) -> tuple[Choice, ...]:
     """The channels of every role. Raises LogError where a named channel is missing or a choice is ambiguous."""
     chosen = [choice for role in SETTING for choice in choose_role(logs, settings, reference, role)]
-    return (*chosen, *candidates(logs, "time"))
+    return (*chosen, *always_used(logs))
+
+
+def always_used(logs: Sequence[Log]) -> list[Choice]:
+    """Channels that serve others and need no choice: time references, and ephemerides."""
+    return [*candidates(logs, "time"), *candidates(logs, "ephemeris")]
 
 
 def choose_role(logs: Sequence[Log], settings: InputSettings, reference: Log | None, role: str) -> list[Choice]:
