@@ -124,6 +124,7 @@ def _add_synth(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser.add_argument("scenario", metavar="SCENARIO", help="name of a scenario; 'list' lists them")
     parser.add_argument("--seed", metavar="N", type=int, default=0, help="seed of all randomness (default 0)")
     parser.add_argument("-o", "--out", metavar="FILE", type=Path, help="log to write; its extension names the format")
+    parser.add_argument("--force", action="store_true", help="overwrite files that exist")
 
 
 def _add_export(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:

@@ -9,7 +9,7 @@ from pipelines.report import Report, build_report
 from pipelines.report_figures import Plot, bend_of, outage_shades
 from pipelines.report_tables import Figure, Table, figure_text
 from pipelines.result import RunResult
-from pipelines.svg import Layer, Panel, draw_map, draw_time_panels
+from pipelines.svg import Layer, Panel, draw_map, draw_time_panels, map_height
 
 __all__ = ["build_comparison", "comparison_figures", "comparison_plots", "comparison_tables"]
 
@@ -113,28 +113,32 @@ def comparison_plots(labels: Sequence[str], results: Sequence[RunResult]) -> tup
     """The tracks, and for each quantity the errors of all methods."""
     styles = [_STYLES[i % len(_STYLES)] for i in range(len(labels))]
     legend = tuple((f"line {style}", label) for style, label in zip(styles, labels, strict=True))
-    plots = [_plot_tracks(labels, styles, results, legend)]
+    tracks = _track_layers(labels, styles, results)
+    plots = [_plot_tracks(tracks, results[0])]
     judged = [result.evaluation for result in results if result.evaluation is not None]
     for quantity in judged[0].errors if judged else ():
-        plots.append(_plot_errors(quantity, labels, styles, results, legend))
+        beside_tracks = map_height(tracks) if len(plots) == 1 else None
+        plots.append(_plot_errors(quantity, labels, styles, results, legend, beside_tracks))
     return tuple(plots)
 
 
-def _plot_tracks(
-    labels: Sequence[str], styles: Sequence[str], results: Sequence[RunResult], legend: tuple[tuple[str, str], ...]
-) -> Plot:
+def _plot_tracks(layers: Sequence[Layer], first: RunResult) -> Plot:
+    legend = tuple((f"{layer.kind} {layer.style}", layer.name) for layer in layers)
+    lat, lon = np.degrees(first.solution.lla[0, :2])
+    return Plot("Track", f"East and north of the first position, {lat:.6f}°, {lon:.6f}°.", legend, draw_map(layers))
+
+
+def _track_layers(labels: Sequence[str], styles: Sequence[str], results: Sequence[RunResult]) -> list[Layer]:
     origin = results[0].solution.lla[0]
     layers = []
     reference = results[0].timeline.reference
     if reference is not None:
         where = ned_between(origin, reference.lla)
         layers.append(Layer("line", where[:, 1], where[:, 0], "reference", "reference"))
-        legend = (("line reference", "reference"), *legend)
     for label, style, result in zip(labels, styles, results, strict=True):
         track = ned_between(origin, result.solution.lla)
         layers.append(Layer("line", track[:, 1], track[:, 0], style, label))
-    lat, lon = np.degrees(origin[:2])
-    return Plot("Track", f"East and north of the first position, {lat:.6f}°, {lon:.6f}°.", legend, draw_map(layers))
+    return layers
 
 
 def _plot_errors(
@@ -143,6 +147,7 @@ def _plot_errors(
     styles: Sequence[str],
     results: Sequence[RunResult],
     legend: tuple[tuple[str, str], ...],
+    height: float | None,
 ) -> Plot:
     start = min(int(result.solution.t_ns[0]) for result in results)
     duration = max(int(result.solution.t_ns[-1]) - start for result in results) / 1e9
@@ -162,5 +167,5 @@ def _plot_errors(
         ]
         panels.append(Panel(f"{axis} [{unit}]", tuple(layers), bend))
     note = "Estimated minus reference." + ("" if bend is None else " Signed logarithmic scale.")
-    svg = draw_time_panels(panels, duration, outage_shades(results[0]))
+    svg = draw_time_panels(panels, duration, outage_shades(results[0]), height)
     return Plot(f"{quantity.capitalize()} error", note, legend, svg)

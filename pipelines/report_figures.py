@@ -12,7 +12,7 @@ from navreplay.solution import InnovationSeries, Solution
 from navreplay.timeline import FixStatus, Floats, Timeline, Times
 from pipelines.report import outage_errors
 from pipelines.result import RunResult
-from pipelines.svg import Layer, Panel, draw_map, draw_time_panels
+from pipelines.svg import Layer, Panel, draw_map, draw_time_panels, map_height
 
 __all__ = ["Plot", "bend_of", "outage_shades", "report_plots"]
 
@@ -36,7 +36,8 @@ def report_plots(result: RunResult) -> tuple[Plot, ...]:
     """All plots in the order of a report."""
     solution, evaluation = result.solution, result.evaluation
     shades = outage_shades(result)
-    plots = [_plot_track(result), _plot_motion(result, shades)]
+    track = _track_layers(result)
+    plots = [_plot_track(result, track), _plot_motion(result, shades, map_height(track))]
     if evaluation is not None:
         plots += _plot_errors(evaluation, solution, shades)
     else:
@@ -60,10 +61,16 @@ def _elapsed(t_ns: Times, solution: Solution) -> Floats:
 
 
 def _time_plot(
-    title: str, note: str, legend: Legend, panels: Sequence[Panel], solution: Solution, shades: Sequence[tuple[float, float]]
+    title: str,
+    note: str,
+    legend: Legend,
+    panels: Sequence[Panel],
+    solution: Solution,
+    shades: Sequence[tuple[float, float]],
+    height: float | None = None,
 ) -> Plot:
     duration_s = float((solution.t_ns[-1] - solution.t_ns[0]) / 1e9)
-    return Plot(title, note, legend, draw_time_panels(panels, duration_s, shades))
+    return Plot(title, note, legend, draw_time_panels(panels, duration_s, shades, height))
 
 
 def bend_of(*series: Floats) -> float | None:
@@ -76,7 +83,16 @@ def bend_of(*series: Floats) -> float | None:
     return float(10 ** np.floor(np.log10(usual))) if large > 15 * usual else None
 
 
-def _plot_track(result: RunResult) -> Plot:
+def _plot_track(result: RunResult, layers: Sequence[Layer]) -> Plot:
+    legend = tuple(
+        (f"{layer.kind} {layer.style}", layer.name) for layer in sorted(layers, key=lambda layer: layer.kind != "line")
+    )
+    lat, lon = np.degrees(result.solution.lla[0, :2])
+    return Plot("Track", f"East and north of the first position, {lat:.6f}°, {lon:.6f}°.", legend, draw_map(layers))
+
+
+def _track_layers(result: RunResult) -> list[Layer]:
+    """From the lowest to the topmost."""
     solution, timeline = result.solution, result.timeline
     origin = solution.lla[0]
     track = ned_between(origin, solution.lla)
@@ -92,14 +108,12 @@ def _plot_track(result: RunResult) -> Plot:
         outages |= (solution.t_ns >= errors.outage.start_ns) & (solution.t_ns <= errors.outage.end_ns)
     if outages.any():
         lost = np.where(outages[:, None], track, np.nan)
-        layers.append(Layer("line", lost[:, 1], lost[:, 0], "lost", "solution in outages"))
+        layers.append(Layer("line", lost[:, 1], lost[:, 0], "lost", "in outages"))
     rejected = _rejected_fixes(result)
     if len(rejected):
         where = ned_between(origin, rejected)
         layers.append(Layer("crosses", where[:, 1], where[:, 0], "bad", "rejected fix"))
-    legend = tuple((f"{layer.kind} {layer.style}", layer.name) for layer in layers)
-    lat, lon = np.degrees(origin[:2])
-    return Plot("Track", f"East and north of the first position, {lat:.6f}°, {lon:.6f}°.", legend, draw_map(layers))
+    return layers
 
 
 def _fix_layers(timeline: Timeline, origin: Floats) -> list[Layer]:
@@ -110,7 +124,7 @@ def _fix_layers(timeline: Timeline, origin: Floats) -> list[Layer]:
     for status, name in _FIX_NAMES.items():
         rows = timeline.fixes.has_position & (timeline.fixes.status == status)
         if rows.any():
-            layers.append(Layer("dots", where[rows, 1], where[rows, 0], f"fix{int(status)}", f"fix: {name}"))
+            layers.append(Layer("dots", where[rows, 1], where[rows, 0], f"fix{int(status)}", f"{name} fix"))
     return layers
 
 
@@ -123,7 +137,7 @@ def _rejected_fixes(result: RunResult) -> Floats:
     return fixes.lla[np.isin(fixes.t_ns, times) & fixes.has_position]
 
 
-def _plot_motion(result: RunResult, shades: Sequence[tuple[float, float]]) -> Plot:
+def _plot_motion(result: RunResult, shades: Sequence[tuple[float, float]], drawing_height: float) -> Plot:
     solution, timeline = result.solution, result.timeline
     t = _elapsed(solution.t_ns, solution)
     speed = np.linalg.norm(solution.vel_n, axis=1)
@@ -134,7 +148,7 @@ def _plot_motion(result: RunResult, shades: Sequence[tuple[float, float]]) -> Pl
         height.insert(0, Layer("line", _elapsed(reference.t_ns[at], solution), reference.lla[at, 2], "reference", "reference"))
     panels = [Panel("height [m]", tuple(height)), Panel("speed [m/s]", (Layer("line", t, speed, "c1", "solution"),))]
     legend = tuple((f"line {layer.style}", layer.name) for layer in height)
-    return _time_plot("Height and speed", "Height above the ellipsoid.", legend, panels, solution, shades)
+    return _time_plot("Height and speed", "Height above the ellipsoid.", legend, panels, solution, shades, drawing_height)
 
 
 def _plot_errors(evaluation: Evaluation, solution: Solution, shades: Sequence[tuple[float, float]]) -> list[Plot]:

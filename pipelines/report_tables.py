@@ -69,9 +69,11 @@ def headline_figures(report: Report) -> tuple[Figure, ...]:
         nees = report["nees"]["position"]
         inside = f"3 expected; {_percent(nees['share_below_upper'])} below the 97.5 % bound"
         figures.append(Figure("Position NEES", figure_text(nees["mean"]), inside))
-    for kind, innovation in report["innovations"].items():
-        used = f"{innovation['used']} of {innovation['read']}"
-        figures.append(Figure(f"{kind.capitalize()} updates used", used, _reasons(innovation["rejected"])))
+    counts = [(kind, innovation["used"], innovation["read"]) for kind, innovation in report["innovations"].items()]
+    if counts:
+        used, read = sum(count[1] for count in counts), sum(count[2] for count in counts)
+        kinds = "; ".join(f"{kind} {used} of {read}" for kind, used, read in counts)
+        figures.append(Figure("Measurements used", f"{100 * used / max(read, 1):.4g} %", kinds))
     return tuple(figures)
 
 

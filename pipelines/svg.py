@@ -10,10 +10,11 @@ import numpy as np
 from navreplay.timeline import Floats
 from pipelines.scales import Scale, nice_ticks, thin_band, thin_line, time_label, time_ticks
 
-__all__ = ["Layer", "Panel", "draw_map", "draw_time_panels"]
+__all__ = ["Layer", "Panel", "draw_map", "draw_time_panels", "map_height"]
 
 _WIDTH = 520.0
-_LEFT, _RIGHT, _BOTTOM = 66.0, 8.0, 22.0
+_LEFT, _RIGHT, _TOP, _BOTTOM = 66.0, 8.0, 9.0, 10.0
+_MAP_BOTTOM = 34.0
 _PANEL_HEIGHT, _GAP = 104.0, 12.0
 _MOST_DOTS = 4000
 
@@ -103,17 +104,17 @@ def _number(value: float) -> str:
     return f"{value:.6g}".replace("-", "\u2212")
 
 
-def _draw_panel(panel: Panel, across: Scale, shades: Sequence[tuple[float, float]], top: float) -> str:
+def _draw_panel(panel: Panel, across: Scale, shades: Sequence[tuple[float, float]], top: float, tall: float) -> str:
     low, high = _extent(panel.layers)
-    up = Scale(low, high, _PANEL_HEIGHT, panel.linear_to)
+    up = Scale(low, high, tall, panel.linear_to)
     parts = []
     for tick in up.ticks(5):
-        y = top + _PANEL_HEIGHT - float(up.place(np.array(tick)))
+        y = top + tall - float(up.place(np.array(tick)))
         parts.append(f'<path class="grid" d="M{_LEFT} {y:.1f}H{_WIDTH - _RIGHT}"/>')
         parts.append(f'<text class="tick" x="{_LEFT - 5}" y="{y + 3.5:.1f}" text-anchor="end">{_number(tick)}</text>')
     linear_to = "" if panel.linear_to is None else f' data-bend="{panel.linear_to:.6g}"'
     parts.append(
-        f'<svg class="panel" x="{_LEFT}" y="{top}" width="{across.pixels}" height="{_PANEL_HEIGHT}"'
+        f'<svg class="panel" x="{_LEFT}" y="{top}" width="{across.pixels}" height="{tall:.1f}"'
         f' data-low="{low:.6g}" data-high="{high:.6g}"{linear_to}>'
     )
     for start, end in shades:
@@ -121,55 +122,71 @@ def _draw_panel(panel: Panel, across: Scale, shades: Sequence[tuple[float, float
         parts.append(f'<rect class="shade" x="{x0:.1f}" width="{max(x1 - x0, 1):.1f}" height="100%"/>')
     parts += [_draw_layer(layer, across, up) for layer in panel.layers]
     parts.append('<path class="cursor" d=""/></svg>')
-    parts.append(f'<rect class="frame" x="{_LEFT}" y="{top}" width="{across.pixels}" height="{_PANEL_HEIGHT}"/>')
-    middle = top + _PANEL_HEIGHT / 2
+    parts.append(f'<rect class="frame" x="{_LEFT}" y="{top}" width="{across.pixels}" height="{tall:.1f}"/>')
+    middle = top + tall / 2
     parts.append(f'<text class="label" transform="translate(11 {middle:.1f}) rotate(-90)">{escape(panel.label)}</text>')
     return "".join(parts)
 
 
-def draw_time_panels(panels: Sequence[Panel], duration_s: float, shades: Sequence[tuple[float, float]] = ()) -> str:
-    """Panels one above the other over 0 to duration_s [s]; shades are stretches (start, end) [s] marked in all of them."""
+def draw_time_panels(
+    panels: Sequence[Panel], duration_s: float, shades: Sequence[tuple[float, float]] = (), height: float | None = None
+) -> str:
+    """Panels one above the other over 0 to duration_s [s]; shades are stretches (start, end) [s] marked in all of them.
+    height: of the whole drawing [px], where it has to match another one."""
     across = Scale(0.0, max(duration_s, 1e-3), _WIDTH - _LEFT - _RIGHT)
-    height = len(panels) * (_PANEL_HEIGHT + _GAP) + _BOTTOM
+    tall = _PANEL_HEIGHT if height is None else (height - _TOP - _BOTTOM) / len(panels) - _GAP
+    height = _TOP + len(panels) * (tall + _GAP) + _BOTTOM
     parts = [
         f'<svg class="plot time" viewBox="0 0 {_WIDTH:g} {height:g}" role="img"'
         f' data-left="{_LEFT}" data-span="{across.pixels}" data-duration="{across.high:.6g}">'
     ]
-    foot = height - _BOTTOM - _GAP + 4
+    foot = f"{height - _BOTTOM - _GAP:.1f}"
     for tick in time_ticks(0.0, across.high, 7):
         x = _LEFT + float(across.place(np.array(tick)))
-        parts.append(f'<path class="grid" d="M{x:.1f} 4V{foot}"/>')
+        parts.append(f'<path class="grid" d="M{x:.1f} {_TOP}V{foot}"/>')
         anchor = "end" if x > _WIDTH - 20 else "middle"
-        parts.append(f'<text class="tick" x="{x:.1f}" y="{height - 8}" text-anchor="{anchor}">{time_label(tick)}</text>')
+        parts.append(
+            f'<text class="tick" x="{x:.1f}" y="{height - _BOTTOM + 4:.1f}" text-anchor="{anchor}">{time_label(tick)}</text>'
+        )
     for row, panel in enumerate(panels):
-        parts.append(_draw_panel(panel, across, shades, 4 + row * (_PANEL_HEIGHT + _GAP)))
+        parts.append(_draw_panel(panel, across, shades, _TOP + row * (tall + _GAP), tall))
     return "".join([*parts, "</svg>"])
+
+
+def map_height(layers: Sequence[Layer]) -> float:
+    """Height of the drawing [px] that `draw_map` makes of layers."""
+    return _TOP + _map_scales(layers)[1].pixels + _MAP_BOTTOM
 
 
 def draw_map(layers: Sequence[Layer], unit: str = "m") -> str:
     """Layers over east (x) and north (y) with the same scale on both axes."""
-    inner = _WIDTH - _LEFT - _RIGHT
-    spans = [_finite_range([layer.x for layer in layers]), _finite_range([layer.y for layer in layers])]
-    size = max(spans[0][1] - spans[0][0], spans[1][1] - spans[1][0], 1.0) * 1.08
-    per_pixel = size / inner
-    tall = min(max((spans[1][1] - spans[1][0]) * 1.08 / per_pixel + 16, inner * 0.45), inner)
-    across, up = (_centred(span, pixels, per_pixel) for span, pixels in zip(spans, (inner, tall), strict=True))
-    height = tall + 38
+    across, up = _map_scales(layers)
+    inner, tall, height = across.pixels, up.pixels, map_height(layers)
     parts = [f'<svg class="plot map" viewBox="0 0 {_WIDTH:g} {height:.0f}" role="img">']
     for tick in nice_ticks(across.low, across.high, 6):
         x = _LEFT + float(across.place(np.array(tick)))
-        parts.append(f'<path class="grid" d="M{x:.1f} 4V{tall + 4:.1f}"/>')
-        parts.append(f'<text class="tick" x="{x:.1f}" y="{tall + 18:.1f}" text-anchor="middle">{_number(tick)}</text>')
+        parts.append(f'<path class="grid" d="M{x:.1f} {_TOP}V{_TOP + tall:.1f}"/>')
+        parts.append(f'<text class="tick" x="{x:.1f}" y="{_TOP + tall + 14:.1f}" text-anchor="middle">{_number(tick)}</text>')
     for tick in nice_ticks(up.low, up.high, 6):
-        y = 4 + tall - float(up.place(np.array(tick)))
+        y = _TOP + tall - float(up.place(np.array(tick)))
         parts.append(f'<path class="grid" d="M{_LEFT} {y:.1f}H{_WIDTH - _RIGHT}"/>')
         parts.append(f'<text class="tick" x="{_LEFT - 5}" y="{y + 3.5:.1f}" text-anchor="end">{_number(tick)}</text>')
-    parts.append(f'<svg class="panel" x="{_LEFT}" y="4" width="{inner}" height="{tall:.1f}">')
+    parts.append(f'<svg class="panel" x="{_LEFT}" y="{_TOP}" width="{inner}" height="{tall:.1f}">')
     parts += [_draw_layer(layer, across, up, x_ordered=False) for layer in layers]
-    parts.append(f'</svg><rect class="frame" x="{_LEFT}" y="4" width="{inner}" height="{tall:.1f}"/>')
-    parts.append(f'<text class="label" transform="translate(11 {4 + tall / 2:.1f}) rotate(-90)">north [{unit}]</text>')
+    parts.append(f'</svg><rect class="frame" x="{_LEFT}" y="{_TOP}" width="{inner}" height="{tall:.1f}"/>')
+    parts.append(f'<text class="label" transform="translate(11 {_TOP + tall / 2:.1f}) rotate(-90)">north [{unit}]</text>')
     parts.append(f'<text class="label" x="{_LEFT + inner / 2}" y="{height - 3:.1f}">east [{unit}]</text></svg>')
     return "".join(parts)
+
+
+def _map_scales(layers: Sequence[Layer]) -> tuple[Scale, Scale]:
+    """East and north, as many metres per pixel on both; at least 0.45 and at most as high as wide."""
+    inner = _WIDTH - _LEFT - _RIGHT
+    spans = [_finite_range([layer.x for layer in layers]), _finite_range([layer.y for layer in layers])]
+    wide, high = (span[1] - span[0] for span in spans)
+    per_pixel = max(wide, high, 1.0) * 1.08 / inner
+    tall = min(max(high * 1.08 / per_pixel + 16, inner * 0.45), inner)
+    return _centred(spans[0], inner, per_pixel), _centred(spans[1], tall, per_pixel)
 
 
 def _finite_range(values: Sequence[Floats]) -> tuple[float, float]:

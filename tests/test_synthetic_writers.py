@@ -197,7 +197,7 @@ def test_csv_marks_means_and_leaves_unknown_velocity_empty(tmp_path):
 def test_nothing_is_overwritten(tmp_path, suffix):
     log = RANGES if suffix == ".obs" else LOG
     write(log, tmp_path / f"log{suffix}")
-    with pytest.raises(LogError, match="exists already; remove it or choose another name"):
+    with pytest.raises(LogError, match=r"exists already; .*choose another name|exists already; remove this folder"):
         write(log, tmp_path / f"log{suffix}")
 
 
@@ -209,3 +209,19 @@ def test_paths_that_cannot_be_written_are_refused_in_one_line(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(LogError, match="cannot be written"):
         write(LOG, tmp_path / "file" / "log.mcap")
+
+
+@pytest.mark.parametrize("name", ["log.mcap", "log.bag", "log.db3", "log.csv"])
+def test_files_are_overwritten_only_by_force(tmp_path, name):
+    paths = write(LOG, tmp_path / name)
+    with pytest.raises(LogError, match="exists already"):
+        write(LOG, tmp_path / name)
+    paths[0].write_bytes(b"old")
+    assert write(LOG, tmp_path / name, force=True) == paths
+    assert paths[0].stat().st_size > 1000
+
+
+def test_a_folder_is_never_overwritten(tmp_path):
+    (tmp_path / "home").mkdir()
+    with pytest.raises(LogError, match="remove this folder"):
+        write(LOG, tmp_path / "home", force=True)

@@ -23,5 +23,5 @@ def run(arguments: argparse.Namespace) -> None:
         raise LogError(f"unknown scenario '{arguments.scenario}'; the nearest is '{nearest}'; 'navreplay synth list' lists all")
     if arguments.out is None:
         raise LogError("synth: name the file to write with -o; its extension names the format, for example -o drive.mcap")
-    for path in write(simulate(SCENARIOS[arguments.scenario], arguments.seed), arguments.out):
+    for path in write(simulate(SCENARIOS[arguments.scenario], arguments.seed), arguments.out, arguments.force):
         print(path)

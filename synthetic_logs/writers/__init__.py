@@ -20,11 +20,11 @@ FORMATS: dict[str, str] = {
 _BAGS = (".bag", ".db3", "")
 
 
-def write(log: SyntheticLog, path: str | Path) -> tuple[Path, ...]:
+def write(log: SyntheticLog, path: str | Path, force: bool = False) -> tuple[Path, ...]:
     """Writes a log in the format that the extension names (see `FORMATS`) and its truth as NAME.truth.csv beside it.
 
-    Returns the paths written, the truth last. Raises LogError for an unknown extension, for a path that exists already, for one
-    that cannot be written and for a format that cannot hold what the log has.
+    Returns the paths written, the truth last. force: overwrite files, but never a folder. Raises LogError for an unknown
+    extension, for a path that exists already or cannot be written, and for a format that cannot hold what the log has.
     """
     path = Path(path)
     write_log = _writer(path)
@@ -33,8 +33,7 @@ def write(log: SyntheticLog, path: str | Path) -> tuple[Path, ...]:
     truth = path.with_suffix(".truth.csv")
     logs = _log_paths(log, path)
     for target in (*logs, truth):
-        if target.exists():
-            raise LogError(f"{target}: exists already; remove it or choose another name")
+        _make_way(target, force)
     from synthetic_logs.writers.text import write_truth
 
     try:
@@ -44,6 +43,17 @@ def write(log: SyntheticLog, path: str | Path) -> tuple[Path, ...]:
     except OSError as error:
         raise LogError(f"{path}: cannot be written: {error.strerror or error}") from error
     return (*logs, truth)
+
+
+def _make_way(target: Path, force: bool) -> None:
+    if target.is_dir():
+        raise LogError(f"{target}: exists already; remove this folder or choose another name")
+    if target.exists() and not force:
+        raise LogError(f"{target}: exists already; choose another name, or overwrite it with --force")
+    try:
+        target.unlink(missing_ok=True)
+    except OSError as error:
+        raise LogError(f"{target}: cannot be written: {error.strerror}; choose another name") from error
 
 
 def _log_paths(log: SyntheticLog, path: Path) -> tuple[Path, ...]:
