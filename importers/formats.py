@@ -17,6 +17,7 @@ from importers.settings import InputSettings
 from importers.sp3 import is_sp3, read_sp3
 from importers.text_log import TextLog
 from importers.tum import is_tum, read_tum
+from importers.ubx import UbxLog, is_ubx
 from navreplay.timeline import LogError
 
 __all__ = ["FORMATS", "Format", "open_log"]
@@ -146,6 +147,10 @@ def _open_rinex_navigation(path: str, head: bytes, settings: InputSettings) -> L
     return TextLog(path, "rinex", "rinex/navigation", lambda: read_rinex_navigation(path, leap_seconds(settings.leap_seconds)))
 
 
+def _open_ubx(path: str, head: bytes, settings: InputSettings) -> Log | None:
+    return UbxLog(path) if is_ubx(head) else None
+
+
 def _open_sp3(path: str, head: bytes, settings: InputSettings) -> Log | None:
     if not is_sp3(_text(head)):
         return None
@@ -160,6 +165,7 @@ FORMATS: tuple[Format, ...] = (
     Format("mcap", "MCAP with ROS 2, ROS 1, Foxglove JSON or protobuf messages", (".mcap",), _open_mcap),
     Format("ros1", "ROS 1 bag", (".bag",), _open_ros1),
     Format("ros2", "ROS 2 bag: the folder, or its .db3 file", (".db3",), _open_ros2),
+    Format("ubx", "u-blox stream with raw measurements (RXM-RAWX, RXM-SFRBX)", (".ubx",), _open_ubx),
     Format("csv", "any table of numbers, or matrix of a MATLAB file, by [[input.csv]]", (".csv", ".txt", ".mat"), _open_mapped),
     Format("navreplay", "this program's own CSV: imu, fix, trajectory, solution", (".csv",), _open_own),
     Format("pos", "RTKLIB position file", (".pos",), _open_pos),

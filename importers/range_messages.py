@@ -102,6 +102,7 @@ def _vectors(values: Sequence[Any]) -> Floats:
 RANGE_TYPES: Mapping[str, Callable[[Table], Table]] = {
     "csv/range": _as_they_are,
     "rinex/observation": _as_they_are,
+    "ubx/RXM-RAWX": _as_they_are,
     "navreplay.GnssRanges": _own,
 }
 """By type (without the ``/msg/`` of ROS 2), what makes a table per observation of the table of its messages."""

@@ -14,6 +14,8 @@ __all__ = ["SYSTEMS", "Applied", "RangeRows", "join_range_rows", "range_rows", "
 SYSTEMS = "GRECJ"
 """RINEX letters of the systems that can be used: GPS, GLONASS, Galileo, BeiDou, QZSS."""
 
+_OTHERS = "SI"
+"""SBAS and NavIC, which are known but not used."""
 _OPTIONAL = ("range_rate", "pseudorange_std", "range_rate_std", "cn0")
 
 
@@ -83,5 +85,5 @@ def satellite_names(names: np.ndarray) -> NDArray[np.str_]:
 
 def _satellite_name(text: str) -> str:
     system, number = text.strip()[:1].upper(), text.strip()[1:].strip()
-    known = system in SYSTEMS and number.isascii() and number.isdigit() and 0 < int(number) < 100
+    known = bool(system) and system in SYSTEMS + _OTHERS and number.isascii() and number.isdigit() and 0 < int(number) < 100
     return f"{system}{int(number):02d}" if known else ""

@@ -1,0 +1,52 @@
+"""Broadcast navigation data, as u-blox receivers pass it on, decoded into ephemerides.
+
+Words are those of RXM-SFRBX: 30-bit words of GPS, QZSS and BeiDou right-aligned, data bits upright; pages of Galileo I/NAV and
+strings of GLONASS left-aligned in 32-bit words. Weeks are told by a time near the log's, for GPS repeats them every 1024.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from importers.beidou_words import decode_d1
+from importers.ephemeris import KEPLER, Ephemerides
+from importers.galileo_words import decode_inav
+from importers.glonass_words import decode_strings
+from importers.gps_words import decode_lnav
+from navreplay.time_scales import LeapSeconds
+
+__all__ = ["decode_words"]
+
+_GPS, _GALILEO, _BEIDOU, _QZSS, _GLONASS = 0, 2, 3, 5, 6
+
+
+def decode_words(
+    gnss: NDArray[np.int64],
+    number: NDArray[np.int64],
+    frequency: NDArray[np.int64],
+    words: NDArray[np.int64],
+    near_ns: int,
+    leap: LeapSeconds,
+) -> tuple[Ephemerides, NDArray[np.bool_]]:
+    """Ephemerides of messages in the order of their reception, and which of these (n,) are of a kind that can be decoded.
+
+    gnss: (n,) identifier of the system; number: (n,) of the satellite; frequency: (n,) GLONASS frequency number; words: (n,
+    10).
+    """
+    known = np.zeros(len(gnss), dtype=bool)
+    kepler = [np.empty(0, KEPLER)]
+    klobuchar = None
+    for system, letter in ((_GPS, "G"), (_QZSS, "J")):
+        rows = np.flatnonzero(gnss == system)
+        records, coefficients, good = decode_lnav(letter, number[rows], words[rows], near_ns)
+        known[rows[good]] = True
+        kepler.append(records)
+        klobuchar = coefficients if klobuchar is None else klobuchar
+    for system, decode in ((_GALILEO, decode_inav), (_BEIDOU, decode_d1)):
+        rows = np.flatnonzero(gnss == system)
+        records, good = decode(number[rows], words[rows], near_ns)
+        known[rows[good]] = True
+        kepler.append(records)
+    rows = np.flatnonzero(gnss == _GLONASS)
+    glonass, good = decode_strings(number[rows], frequency[rows], words[rows], near_ns, leap)
+    known[rows[good]] = True
+    return Ephemerides(np.concatenate(kepler), glonass, klobuchar), known
