@@ -117,7 +117,8 @@ _SHELLS = (
 def arrange_constellation(systems: str, reference_ns: int) -> Orbits:
     """The satellites of some systems, such as ``GEC``, with elements for reference_ns [GPS ns]; its arrays are read-only.
 
-    In the order of their names; the same arrangement over the ground at every reference time. Raises KeyError for an unknown system.
+    In the order of their names; the same arrangement over the ground at every reference time. Raises KeyError for an unknown
+    system.
     """
     shells = {shell.system: shell for shell in _SHELLS}
     parts = [_arrange_shell(shells[system], reference_ns) for system in sorted(systems)]

@@ -8,14 +8,17 @@ from datetime import datetime
 import numpy as np
 import pytest
 from mcap.reader import make_reader
+from rosbags import rosbag1, rosbag2
+from rosbags.typesys import Stores, get_typestore
 
 from navreplay.atmosphere import SPEED_OF_LIGHT
-from navreplay.time_scales import gps_from_utc, week_tow_from_gps
+from navreplay.time_scales import gps_from_utc, gps_from_week_tow, week_tow_from_gps
 from navreplay.timeline import LogError
 from synthetic_logs import SCENARIOS, simulate, with_duration, write
 from synthetic_logs.constellation import ascending_node, refer_to
 from synthetic_logs.signals import carrier_of
 from synthetic_logs.simulation import orbits_of
+from synthetic_logs.writers.gnss_comm import TOPICS, register_types, satellite_number
 from synthetic_logs.writers.range_messages import SCHEMA, range_messages
 
 LOG = simulate(with_duration(SCENARIOS["ranges-open"], 6.0), 5)
@@ -160,9 +163,63 @@ def test_rinex_ephemerides_hold_the_elements(rinex):
         assert delay == pytest.approx(issue.group_delay[row], rel=1e-12)
 
 
-def test_formats_that_cannot_hold_a_log_are_refused(tmp_path):
-    with pytest.raises(LogError, match=r"a ROS bag cannot hold the ranges of ranges-open; write .mcap, .csv or .obs"):
-        write(LOG, tmp_path / "log.bag")
+@pytest.mark.parametrize("name", ["log.bag", "log"])
+def test_bags_hold_raw_ranges_and_ephemerides(tmp_path, name):
+    path = write(LOG, tmp_path / name)[0]
+    store = get_typestore(Stores.ROS1_NOETIC if name == "log.bag" else Stores.ROS2_HUMBLE)
+    register_types(store)
+    decode = store.deserialize_ros1 if name == "log.bag" else store.deserialize_cdr
+    with (rosbag1 if name == "log.bag" else rosbag2).Reader(path) as reader:
+        found = [(c.topic, t_ns, decode(data, c.msgtype)) for c, t_ns, data in reader.messages()]
+    times = [t_ns for _, t_ns, _ in found]
+    assert times == sorted(times)
+    assert {topic for topic, _, _ in found} == {"/imu/data", *TOPICS}
+    epochs = [(t_ns, message) for topic, t_ns, message in found if topic == "/ublox_driver/range_meas"]
+    rows = [(t_ns, row) for t_ns, message in epochs for row in message.meas]
+    stamps = [gps_from_week_tow(np.array([row.time.week]), np.array([row.time.tow]))[0] for _, row in rows]
+    np.testing.assert_array_equal(stamps, LOG.ranges.t_ns)
+    np.testing.assert_array_equal(gps_from_utc(np.array([t_ns for t_ns, _ in rows])), LOG.ranges.t_ns)
+    assert [row.sat for _, row in rows] == [satellite_number(sat) for sat in LOG.ranges.sat.tolist()]
+    psr, dopp, freqs, cn0 = np.array([(row.psr[0], row.dopp[0], row.freqs[0], row.CN0[0]) for _, row in rows]).T
+    np.testing.assert_allclose(psr + LOG.range_truth.satellite_clock, LOG.ranges.pseudorange, rtol=1e-15)
+    rate = -dopp * SPEED_OF_LIGHT / freqs
+    np.testing.assert_allclose(rate + LOG.range_truth.satellite_clock_rate, LOG.ranges.range_rate, atol=1e-11)
+    np.testing.assert_array_equal(cn0, LOG.ranges.cn0)
+    check_ephemerides([message for topic, _, message in found if topic == "/ublox_driver/ephem"])
+    ionosphere = next(message for topic, _, message in found if topic == "/ublox_driver/iono_params")
+    np.testing.assert_array_equal(ionosphere.data, LOG.ranges.klobuchar)
+
+
+def check_ephemerides(messages):
+    orbits = orbits_of(LOG.scenario.journey, LOG.scenario.receiver)
+    assert len(messages) == 2 * len(orbits)
+    numbers = {satellite_number(sat): row for row, sat in enumerate(orbits.sat.tolist())}
+    assert (numbers[1], numbers[60], numbers[116]) == tuple(orbits.sat.tolist().index(sat) for sat in ("G01", "E01", "C19"))
+    for message in messages:
+        row = numbers[message.sat]
+        toe_ns = int(gps_from_week_tow(np.array([message.toe.week]), np.array([message.toe.tow]))[0])
+        issue = refer_to(orbits, toe_ns)
+        ahead_s, weeks = (14, 1356) if message.sat >= 98 else (0, 0)
+        assert message.toe_tow == message.toe.tow - ahead_s
+        assert message.week == message.toe.week - weeks
+        told = [message.A, message.M0, message.OMG0, message.omg, message.af0, message.tgd0, message.cis, message.crc]
+        np.testing.assert_allclose(
+            told,
+            [
+                issue.sqrt_a[row] ** 2,
+                issue.mean_anomaly[row],
+                ascending_node(issue, ahead_s)[row],
+                issue.perigee[row],
+                issue.af0[row],
+                issue.group_delay[row],
+                issue.cis[row],
+                issue.crc[row],
+            ],
+            rtol=1e-14,
+        )
+
+
+def test_rinex_without_ranges_is_refused(tmp_path):
     fixes = simulate(with_duration(SCENARIOS["static"], 2.0), 1)
     with pytest.raises(LogError, match="RINEX holds ranges, but the scenario static has none; write another format"):
         write(fixes, tmp_path / "log.obs")

@@ -1,11 +1,14 @@
 """Synthetic log, every writer, importer: equal to the last bit the format can hold (degrees cost a unit in the last place)."""
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 
 from importers.load import load_timeline
-from synthetic_logs import SCENARIOS, simulate, write
+from synthetic_logs import SCENARIOS, simulate, with_duration, write
 
+RANGES = simulate(with_duration(SCENARIOS["ermakf-city"], 60.0), 11)
 CAR = simulate(SCENARIOS["car-short"], 11)
 
 
@@ -35,3 +38,27 @@ def test_increments_come_back_as_increments_from_csv(tmp_path):
     log = simulate(SCENARIOS["aircraft-spiral"], 11)
     *paths, truth = write(log, tmp_path / "log.csv")
     assert_same_log(load_timeline(paths, reference=truth), log)
+
+
+def test_ranges_come_back_from_mcap(tmp_path):
+    *paths, truth = write(RANGES, tmp_path / "log.mcap")
+    ranges = load_timeline(paths, reference=truth).ranges
+    for field in fields(ranges):
+        np.testing.assert_array_equal(getattr(ranges, field.name), getattr(RANGES.ranges, field.name))
+
+
+def test_ranges_come_back_from_rinex_to_its_last_digit(tmp_path):
+    *paths, truth = write(RANGES, tmp_path / "log.obs")
+    timeline = load_timeline(paths, reference=truth)
+    ranges = timeline.ranges
+    np.testing.assert_array_equal(timeline.imu.gyro, RANGES.imu.gyro)
+    for name in ("t_ns", "sat", "signal", "klobuchar", "ionosphere_removed", "troposphere_removed"):
+        np.testing.assert_array_equal(getattr(ranges, name), getattr(RANGES.ranges, name))
+    for name, tolerance in (
+        ("pseudorange", 6e-4),
+        ("range_rate", 1e-4),
+        ("cn0", 6e-4),
+        ("sat_pos_e", 1e-3),
+        ("sat_vel_e", 1e-6),
+    ):
+        np.testing.assert_allclose(getattr(ranges, name), getattr(RANGES.ranges, name), rtol=0, atol=tolerance)

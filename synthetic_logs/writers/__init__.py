@@ -10,14 +10,13 @@ __all__ = ["FORMATS", "write"]
 
 FORMATS: dict[str, str] = {
     ".mcap": "MCAP with ROS 2 messages and ranges in JSON, chunks compressed with zstd",
-    ".bag": "ROS 1 bag (logs without ranges)",
-    ".db3": "ROS 2 bag, the bare SQLite file (logs without ranges)",
-    "": "ROS 2 bag, a directory with metadata.yaml and the SQLite file (logs without ranges)",
+    ".bag": "ROS 1 bag, ranges as gnss_comm messages",
+    ".db3": "ROS 2 bag, the bare SQLite file, ranges as gnss_comm messages",
+    "": "ROS 2 bag, a directory with metadata.yaml and the SQLite file",
     ".csv": "NAME.imu.csv, NAME.fix.csv and NAME.ranges.csv in our own columns",
     ".obs": "ranges as RINEX 3 NAME.obs and NAME.nav, with NAME.imu.csv",
 }
 """What `write` can produce, by extension of the path."""
-_BAGS = (".bag", ".db3", "")
 
 
 def write(log: SyntheticLog, path: str | Path, force: bool = False) -> tuple[Path, ...]:
@@ -28,8 +27,6 @@ def write(log: SyntheticLog, path: str | Path, force: bool = False) -> tuple[Pat
     """
     path = Path(path)
     write_log = _writer(path)
-    if log.ranges is not None and path.suffix in _BAGS:
-        raise LogError(f"{path}: a ROS bag cannot hold the ranges of {log.scenario.name}; write .mcap, .csv or .obs")
     truth = path.with_suffix(".truth.csv")
     logs = _log_paths(log, path)
     for target in (*logs, truth):
@@ -79,7 +76,7 @@ def _writer(path: Path) -> Callable[[SyntheticLog, Path], None]:
         from synthetic_logs.writers.rinex import write_rinex
 
         return write_rinex
-    if path.suffix in _BAGS:
+    if path.suffix in (".bag", ".db3", ""):
         from synthetic_logs.writers import ros_bags
 
         return {".bag": ros_bags.write_ros1, ".db3": ros_bags.write_ros2_file, "": ros_bags.write_ros2}[path.suffix]

@@ -11,19 +11,16 @@ from navreplay.atmosphere import SPEED_OF_LIGHT
 from navreplay.earth import ecef_from_lla
 from navreplay.time_scales import GPS_EPOCH_UNIX_S, WEEK_S, utc_from_gps
 from navreplay.timeline import Floats, LogError, RangeSeries
-from synthetic_logs.constellation import Orbits, ascending_node, refer_to
+from synthetic_logs.constellation import Orbits, ascending_node
 from synthetic_logs.ranges import RangeTruth
-from synthetic_logs.signals import SIGNALS, carrier_of, system_of
+from synthetic_logs.signals import SIGNALS, carrier_of
 from synthetic_logs.simulation import Journey, SyntheticLog, orbits_of
+from synthetic_logs.writers.broadcast import AHEAD_S, WEEKS_BEFORE, issues
 from synthetic_logs.writers.text import write_imu
 
 __all__ = ["write_rinex"]
 
 _S = 1_000_000_000
-_HOUR_NS = 3600 * _S
-_AHEAD_S = {"G": 0, "E": 0, "C": 14}
-"""GPS time less the system's own time [s]; BeiDou time began with week 1356 of GPS."""
-_WEEKS_BEFORE = {"G": 0, "E": 0, "C": 1356}
 _GALILEO_INAV_E1B = 517
 
 
@@ -103,12 +100,9 @@ def _navigation_lines(orbits: Orbits, journey: Journey, klobuchar: Floats | None
             yield _labelled(f"{name} " + "".join(f"{value:12.4E}" for value in values), "IONOSPHERIC CORR")
     yield _labelled(f"{_leap_seconds(journey.start_ns):6d}", "LEAP SECONDS")
     yield _labelled("", "END OF HEADER")
-    last_hour = -(-(journey.start_ns + int(journey.duration * _S)) // _HOUR_NS)
-    for hour in range(journey.start_ns // _HOUR_NS, last_hour + 1):
-        for system, ahead_s in _AHEAD_S.items():
-            issue = refer_to(orbits.rows(system_of(orbits.sat) == system), hour * _HOUR_NS + ahead_s * _S)
-            for row in range(len(issue)):
-                yield from _ephemeris_lines(issue, row, system)
+    for system, issue in issues(orbits, journey):
+        for row in range(len(issue)):
+            yield from _ephemeris_lines(issue, row, system)
 
 
 def _ephemeris_lines(issue: Orbits, row: int, system: str) -> Iterator[str]:
@@ -117,12 +111,12 @@ def _ephemeris_lines(issue: Orbits, row: int, system: str) -> Iterator[str]:
     def numbers(*values: float) -> str:
         return "".join(f"{value:19.12E}" for value in values)
 
-    time_ns = issue.reference_ns - _AHEAD_S[system] * _S
+    time_ns = issue.reference_ns - AHEAD_S[system] * _S
     week, time_of_week = divmod(time_ns // _S, WEEK_S)
     issue_number = time_of_week // 3600
-    node = ascending_node(issue, _AHEAD_S[system])
+    node = ascending_node(issue, AHEAD_S[system])
     delay = issue.group_delay[row]
-    week -= _WEEKS_BEFORE[system]
+    week -= WEEKS_BEFORE[system]
     source = {"G": 1, "E": _GALILEO_INAV_E1B, "C": 0}[system]
     accuracy = {"G": 2.0, "E": 3.12, "C": 2.0}[system]
     last = {"G": (delay, issue_number), "E": (delay, delay), "C": (delay, 0.0)}[system]
