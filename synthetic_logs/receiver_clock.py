@@ -24,8 +24,8 @@ class ReceiverClock:
 
     offset: float = 3000.0
     drift: float = 30.0
-    frequency_noise: float = 0.05
-    frequency_walk: float = 0.03
+    frequency_noise: float = 0.1
+    frequency_walk: float = 0.2
     resets: bool = False
 
 
