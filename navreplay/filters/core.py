@@ -1,5 +1,6 @@
 """The measurement update: one innovation, one conditioning, for every filter."""
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -7,7 +8,7 @@ from scipy.linalg.lapack import dposv
 
 from navreplay.timeline import Floats, LogError
 
-__all__ = ["Gaussian", "Innovation", "chi_square", "condition", "kalman_gain", "symmetric"]
+__all__ = ["Gaussian", "Innovation", "Leftover", "chi_square", "condition", "kalman_gain", "symmetric"]
 
 
 class Gaussian(NamedTuple):
@@ -17,11 +18,20 @@ class Gaussian(NamedTuple):
     cov: Floats
 
 
+class Leftover(NamedTuple):
+    """What an epoch's measurement was off from the state behind its update. t_ns: the epoch. residual: by label, measured minus
+    predicted from the corrected state; of components that were not used, too."""
+
+    t_ns: int
+    residual: Mapping[str, float]
+
+
 class Innovation(NamedTuple):
     """A measurement against its prediction.
 
     residual (m,): measured minus predicted. cross (n, m): covariance of state and prediction. spread (m, m): covariance of
-    the prediction without noise. noise (m, m): nominal R. labels (m,): one per component, e.g. ``position north``.
+    the prediction without noise. noise (m, m): nominal R. labels (m,): one per component, e.g. ``position north``. t_ns: the
+    epoch. leftover: of the epoch before, None where the state in between is not carried by the same filter.
     """
 
     residual: Floats
@@ -29,12 +39,20 @@ class Innovation(NamedTuple):
     spread: Floats
     noise: Floats
     labels: tuple[str, ...]
+    t_ns: int = 0
+    leftover: Leftover | None = None
 
     def select(self, rows: np.ndarray) -> "Innovation":
         """The components with index in rows (k,)."""
         square = rows[:, None], rows
         labels = tuple(self.labels[i] for i in rows)
-        return Innovation(self.residual[rows], self.cross[:, rows], self.spread[square], self.noise[square], labels)
+        return self._replace(
+            residual=self.residual[rows],
+            cross=self.cross[:, rows],
+            spread=self.spread[square],
+            noise=self.noise[square],
+            labels=labels,
+        )
 
 
 def symmetric(matrix: Floats) -> Floats:

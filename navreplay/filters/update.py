@@ -5,7 +5,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from navreplay.error_models.error_model import ErrorModel
-from navreplay.filters.core import Gaussian, Innovation, condition
+from navreplay.filters.core import Gaussian, Innovation, Leftover, condition
 from navreplay.filters.presets import Method
 from navreplay.filters.record import Recorder
 from navreplay.measurements import Measurement
@@ -83,6 +83,7 @@ class Updater:
         self._method = method
         self._recorder = recorder
         self._adapter_state: Any = method.adapter.init()
+        self._leftover: Leftover | None = None
         self._zero = np.zeros(model.size)
 
     def update(self, epoch: int, state: NavState, cov: Floats, dtheta: Floats, dt: float) -> tuple[NavState, Floats, RowStatus]:
@@ -93,7 +94,8 @@ class Updater:
         t_ns = int(self._aiding.t_ns[epoch])
         rule, adapter = self._method.rule, self._method.adapter
         prior = Gaussian(self._zero, cov)
-        innovation = rule.innovate(prior, measurement)
+        innovation = rule.innovate(prior, measurement)._replace(t_ns=t_ns, leftover=self._leftover)
+        labels = innovation.labels
         adapted, noise, self._adapter_state = adapter.adapt(self._adapter_state, prior, innovation)
         if adapted is not prior:
             innovation = rule.innovate(adapted, measurement)
@@ -108,9 +110,14 @@ class Updater:
                 verdict = self._gate.judge(measurement.kinds, innovation, noise)
         verdict.record(self._recorder, t_ns, measurement.kinds, innovation, noise)
         if not len(verdict.passed):
+            self._leave(t_ns, labels, measurement.residual)
             return state, cov, RowStatus.REJECTED
         if len(verdict.passed) < len(noise):
             innovation = innovation.select(verdict.passed)
             noise = noise[verdict.passed[:, None], verdict.passed]
         posterior = condition(adapted, innovation, noise)
+        self._leave(t_ns, labels, measurement.residual - measurement.jacobian @ posterior.mean)
         return self._model.retract(state, posterior.mean), posterior.cov, RowStatus.UPDATED
+
+    def _leave(self, t_ns: int, labels: tuple[str, ...], residual: Floats) -> None:
+        self._leftover = Leftover(t_ns, dict(zip(labels, residual.tolist(), strict=True)))
