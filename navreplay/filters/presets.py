@@ -6,10 +6,14 @@ from difflib import get_close_matches
 from typing import Any
 
 from navreplay.adapt.adapter import NoiseAdapter
+from navreplay.adapt.eiakf import Eiakf
+from navreplay.adapt.ermakf import Ermakf
+from navreplay.adapt.ermakf_derived import ErmakfDerived
 from navreplay.adapt.fixed import Fixed
 from navreplay.adapt.huber import Huber
 from navreplay.adapt.iae import Iae
 from navreplay.adapt.sage_husa import SageHusa
+from navreplay.adapt.srmakf import Srmakf
 from navreplay.filters.moments import Linearised
 from navreplay.timeline import LogError
 
@@ -46,6 +50,10 @@ PRESETS: dict[str, Preset] = {
         Preset("iae", "R from the innovations of a window (Mohamed and Schwarz 1999)", Iae),
         Preset("sage-husa", "R as a fading mean over the innovations (Sage and Husa 1969)", SageHusa),
         Preset("huber", "outlying measurements weighted down (Huber 1964, Karlgaard and Schaub 2007)", Huber),
+        Preset("eiakf", "R from innovations, correlated ones taken for AR(1) (Ghaleb et al. 2017)", Eiakf),
+        Preset("srmakf", "R from differences of consecutive epochs against the INS (Ge et al. 2020)", Srmakf),
+        Preset("ermakf", "srmakf with random weights, and Burg's method where noise is doubtful (Ge et al. 2020)", Ermakf),
+        Preset("ermakf-derived", "R from differences over several epochs, fitted for variance and correlation", ErmakfDerived),
     )
 }
 

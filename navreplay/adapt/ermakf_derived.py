@@ -1,0 +1,88 @@
+"""Redundant-measurement filter for noise that is correlated in time: what ERMAKF means to be, derived.
+
+Source: own derivation from the differences of Ge et al., Sensors 20 (2020) 6041, (12)-(14). Differences over one epoch add up
+to those over L epochs, in which the INS is still never differenced across a correction. Of first-order Gauss-Markov noise of
+variance s^2 and time constant T, half their variance is v_L = s^2 (1 - rho^L), rho = exp(-1 / T); of white noise it is s^2
+at every L. So v_1 .. v_Lmax of a window show variance and correlation: for each T of a grid the best s^2 is linear least
+squares with weights 1 / L (short lags have more independent samples), and the T of the least residual is taken.
+Assumes: an INS that drifts little against the noise over longest_lag epochs, and noise of one time constant.
+Fails: on time constants beyond the longest lag, of which s^2 / T is all that shows (of 60 epochs it finds 0.7 of s^2, of 5
+and 20 epochs 1.3 and 1.5, and each time it scatters: a window of 60 holds few independent values); on constant biases; and
+with an IMU so poor that its drift passes for correlated noise.
+R says how large the errors are, not that they stay: a filter that takes correlated noise for white still believes their mean.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from navreplay.adapt.adapter import Adaptation
+from navreplay.adapt.ratio import scale_noise
+from navreplay.adapt.trails import Trails, extend_trails, stack_trails
+from navreplay.filters.core import Gaussian, Innovation
+from navreplay.timeline import Floats
+
+__all__ = ["ErmakfDerived", "fit_correlation", "lag_variances"]
+
+_TIME_CONSTANTS = np.array([0.1, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0])
+"""Grid of T [epochs]; the first is white noise."""
+
+
+def lag_variances(differences: Floats, count: Floats, lags: int) -> Floats:
+    """(k, lags) half the mean square of the differences over L = 1 .. lags epochs, NaN where a row has too few.
+
+    differences (k, n) over one epoch each, of which the last count (k,) are known and the others zero.
+    """
+    k, n = differences.shape
+    path = np.concatenate([np.zeros((k, 1)), np.cumsum(differences, axis=1)], axis=1)
+    sums = np.array(
+        [
+            ((path[:, lag:] - path[:, :-lag]) ** 2 * (np.arange(n + 1 - lag) >= n - count[:, None])).sum(axis=1)
+            for lag in range(1, lags + 1)
+        ]
+    ).T
+    known = count[:, None] + 1 - np.arange(1, lags + 1)
+    return np.where(known > 0, sums / (2 * np.maximum(known, 1)), np.nan)
+
+
+def fit_correlation(variances: Floats, longest: Floats) -> tuple[Floats, Floats]:
+    """Variance s^2 (k,) and time constant T (k,) [epochs] that fit s^2 (1 - exp(-L / T)) to variances (k, lags) of lags up to
+    longest (k,)."""
+    lag = np.arange(1, variances.shape[1] + 1)
+    shape = 1 - np.exp(-lag / _TIME_CONSTANTS[:, None])
+    weight = np.where(lag <= longest[:, None], 1 / lag, 0.0)
+    seen = np.where(weight > 0, variances, 0.0)
+    size = (weight * seen) @ shape.T / (weight @ (shape**2).T)
+    misfit = (weight[:, None, :] * (seen[:, None, :] - size[:, :, None] * shape) ** 2).sum(axis=2)
+    best = misfit.argmin(axis=1)
+    return size[np.arange(len(size)), best], _TIME_CONSTANTS[best]
+
+
+@dataclass(frozen=True, slots=True)
+class ErmakfDerived:
+    """window [epochs]: at most. least [epochs]: until a component has so many differences the told R holds for it.
+    longest_lag [epochs]: Lmax, and never more than a third of what the window holds. longest_step [s]: no difference over
+    one epoch reaches further. floor: least ratio of used to told variance."""
+
+    window: int = 60
+    least: int = 10
+    longest_lag: int = 20
+    longest_step: float = 1.5
+    floor: float = 0.01
+
+    def init(self) -> Trails:
+        """Nothing seen yet."""
+        return {}
+
+    def adapt(self, state: Trails, prior: Gaussian, innovation: Innovation) -> Adaptation[Trails]:
+        """R scaled by the variance fitted to each component's differences."""
+        trails = extend_trails(state, innovation, self.window, self.longest_step)
+        differences, count = stack_trails(list(trails.values()), self.window)
+        ratio = np.ones(len(count))
+        enough = count >= self.least
+        if enough.any():
+            differences, count = differences[enough], count[enough]
+            longest = np.maximum(np.minimum(self.longest_lag, count // 3), 1)
+            variance, _ = fit_correlation(lag_variances(differences, count, self.longest_lag), longest)
+            ratio[enough] = np.maximum(variance, self.floor)
+        return Adaptation(prior, scale_noise(innovation.noise, ratio), {**state, **trails})
