@@ -31,6 +31,7 @@ _LAYOUTS: dict[str, tuple[str, ...]] = {
     "navreplay/imu_mean": ("t_gps_ns", *_MEAN_GYRO, *_MEAN_ACCEL),
     "navreplay/trajectory": ("t_gps_ns", *_LLA, *_Q),
     "navreplay/fix": ("t_gps_ns", *_LLA),
+    "navreplay/range": ("t_gps_ns", "sat", "signal", "pseudorange_m", "sat_x_m"),
     "navreplay/solution": (*_WEEK, *_LLA, *_EULER),
 }
 """Required columns by layout; the first that fits is meant."""

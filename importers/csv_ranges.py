@@ -5,11 +5,37 @@ from collections.abc import Mapping
 import numpy as np
 
 from importers.range_rows import Applied, satellite_names
-from importers.settings import CsvMapping
+from importers.settings import CsvMapping, CsvTime, RangeCorrections
 from importers.signals import DEFAULT_SIGNALS, SPEED_OF_LIGHT, carrier_hz
 from navreplay.timeline import Floats, LogError
 
-__all__ = ["range_columns"]
+__all__ = ["OWN_RANGES", "range_columns"]
+
+OWN_RANGES = CsvMapping(
+    match="*",
+    role="range",
+    delimiter=",",
+    header=True,
+    comment="#",
+    time=CsvTime(column="t_gps_ns", unit="ns"),
+    columns={
+        "sat": "sat",
+        "signal": "signal",
+        "pseudorange": "pseudorange_m",
+        "range_rate": "range_rate_mps",
+        "pseudorange_std": "pseudorange_std_m",
+        "range_rate_std": "range_rate_std_mps",
+        "cn0": "cn0_dbhz",
+        "sat_x": "sat_x_m",
+        "sat_y": "sat_y_m",
+        "sat_z": "sat_z_m",
+        "sat_vx": "sat_vx_mps",
+        "sat_vy": "sat_vy_mps",
+        "sat_vz": "sat_vz_mps",
+    },
+    corrections=RangeCorrections(satellite_clock=True, relativity=True, group_delay=True, sagnac="applied"),
+)
+"""This program's own table of ranges (docs/formats.md)."""
 
 _PLAIN = ("pseudorange", "range_rate", "pseudorange_std", "range_rate_std", "cn0")
 _ADDED = {

@@ -6,6 +6,7 @@ import numpy as np
 
 from importers.broadcast_words import decode_words
 from importers.ephemeris import GLONASS, KEPLER, Ephemerides
+from importers.gnss_messages import gnss_comm_ephemerides, gnss_comm_glonass, sfrbx_columns
 from importers.log import Table
 from importers.sp3 import precise_orbits
 from navreplay.time_scales import LeapSeconds
@@ -34,15 +35,40 @@ def _sp3(table: Table, near_ns: int, leap: LeapSeconds) -> tuple[Ephemerides, Ma
 
 
 def _words(table: Table, near_ns: int, leap: LeapSeconds) -> tuple[Ephemerides, Mapping[str, int]]:
-    gnss, number, frequency = (table.columns[name].astype(np.int64) for name in ("gnssId", "svId", "freqId"))
-    words = table.columns["dwrd"].astype(np.int64)
-    ephemerides, known = decode_words(gnss, number, frequency - _CHANNEL_ZERO, words, near_ns, leap)
+    columns = sfrbx_columns(table.columns)
+    gnss, number, frequency = (columns[name].astype(np.int64) for name in ("gnssId", "svId", "freqId"))
+    ephemerides, known = decode_words(gnss, number, frequency - _CHANNEL_ZERO, columns["dwrd"], near_ns, leap)
     return ephemerides, {"message of another kind": int((~known).sum())} if not known.all() else {}
+
+
+def _gnss_comm(table: Table, near_ns: int, leap: LeapSeconds) -> tuple[Ephemerides, Mapping[str, int]]:
+    return _told(gnss_comm_ephemerides(table.columns), np.empty(0, GLONASS), table)
+
+
+def _gnss_comm_glonass(table: Table, near_ns: int, leap: LeapSeconds) -> tuple[Ephemerides, Mapping[str, int]]:
+    return _told(np.empty(0, KEPLER), gnss_comm_glonass(table.columns), table)
+
+
+def _told(kepler: np.ndarray, glonass: np.ndarray, table: Table) -> tuple[Ephemerides, Mapping[str, int]]:
+    lost = len(table.log_time_ns) - len(kepler) - len(glonass)
+    return Ephemerides(kepler, glonass), {"no such satellite": lost} if lost else {}
+
+
+def _ionosphere(table: Table, near_ns: int, leap: LeapSeconds) -> tuple[Ephemerides, Mapping[str, int]]:
+    """Klobuchar's coefficients, as the u-blox driver beside gnss_comm publishes them."""
+    known = [np.asarray(data, dtype=np.float64) for data in table.columns["data"] if len(data) == 8]
+    lost = len(table.log_time_ns) - len(known)
+    nothing = np.empty(0, KEPLER), np.empty(0, GLONASS)
+    return Ephemerides(*nothing, known[-1] if known else None), {"not eight coefficients": lost} if lost else {}
 
 
 EPHEMERIS_TYPES: Mapping[str, Reader] = {
     "rinex/navigation": _rinex,
     "sp3": _sp3,
     "ubx/RXM-SFRBX": _words,
+    "ublox_msgs/RxmSFRBX": _words,
+    "gnss_comm/GnssEphemMsg": _gnss_comm,
+    "gnss_comm/GnssGloEphemMsg": _gnss_comm_glonass,
+    "gnss_comm/StampedFloat64Array": _ionosphere,
 }
 """By type (without the ``/msg/`` of ROS 2)."""

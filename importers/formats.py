@@ -7,6 +7,7 @@ from pathlib import Path
 from importers.clock import leap_seconds
 from importers.csv_layouts import find_layout, read_layout
 from importers.csv_mapping import find_mapping, read_mapped
+from importers.csv_ranges import OWN_RANGES
 from importers.kf_gins import find_kf_gins, read_gnss, read_imu
 from importers.log import Log
 from importers.nmea import is_nmea, read_nmea
@@ -14,10 +15,12 @@ from importers.rinex_navigation import is_rinex_navigation, read_rinex_navigatio
 from importers.rinex_observation import is_rinex_observation, read_rinex_observation
 from importers.rtklib_pos import is_pos, read_pos
 from importers.settings import InputSettings
+from importers.smartphone_csv import is_smartphone, read_smartphone
 from importers.sp3 import is_sp3, read_sp3
 from importers.text_log import TextLog
 from importers.tum import is_tum, read_tum
 from importers.ubx import UbxLog, is_ubx
+from navreplay.time_scales import LEAP_SECONDS
 from navreplay.timeline import LogError
 
 __all__ = ["FORMATS", "Format", "open_log"]
@@ -111,7 +114,13 @@ def _open_mapped(path: str, head: bytes, settings: InputSettings) -> Log | None:
 def _open_own(path: str, head: bytes, settings: InputSettings) -> Log | None:
     lines = [line for line in _text(head).splitlines() if line.strip() and not line.startswith("#")]
     layout = find_layout(lines[0]) if lines else None
+    if layout == "navreplay/range":
+        return TextLog(path, "csv", layout, lambda: read_mapped(path, OWN_RANGES, None, LEAP_SECONDS))
     return None if layout is None else TextLog(path, "csv", layout, lambda: read_layout(path, layout))
+
+
+def _open_smartphone(path: str, head: bytes, settings: InputSettings) -> Log | None:
+    return TextLog(path, "smartphone", "smartphone", lambda: read_smartphone(path)) if is_smartphone(_text(head)) else None
 
 
 def _open_pos(path: str, head: bytes, settings: InputSettings) -> Log | None:
@@ -168,6 +177,7 @@ FORMATS: tuple[Format, ...] = (
     Format("ubx", "u-blox stream with raw measurements (RXM-RAWX, RXM-SFRBX)", (".ubx",), _open_ubx),
     Format("csv", "any table of numbers, or matrix of a MATLAB file, by [[input.csv]]", (".csv", ".txt", ".mat"), _open_mapped),
     Format("navreplay", "this program's own CSV: imu, fix, trajectory, solution", (".csv",), _open_own),
+    Format("smartphone", "Android raw measurements (device_gnss.csv)", (".csv",), _open_smartphone),
     Format("pos", "RTKLIB position file", (".pos",), _open_pos),
     Format("nmea", "NMEA 0183 (GGA and RMC)", (".nmea", ".gga"), _open_nmea),
     Format("kf-gins", "KF-GINS text: IMU increments, GNSS positions", (".txt",), _open_kf_gins),

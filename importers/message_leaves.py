@@ -12,7 +12,8 @@ __all__ = ["Kind", "Leaf", "columns_of_messages", "stack_lists"]
 
 
 class Kind(Enum):
-    """What a leaf holds: one value, several parts of one dtype (x, y, z), a time, text, a fixed array, a variable one."""
+    """What a leaf holds: one value, several parts of one dtype (x, y, z), a time, text, a fixed array, a variable one, an
+    array of messages."""
 
     NUMBER = "number"
     VECTOR = "vector"
@@ -20,6 +21,7 @@ class Kind(Enum):
     TEXT = "text"
     ARRAY = "array"
     LIST = "list"
+    MESSAGES = "messages"
 
 
 @dataclass(frozen=True, slots=True)

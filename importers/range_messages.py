@@ -5,13 +5,14 @@ from typing import Any
 
 import numpy as np
 
+from importers.gnss_messages import gnss_comm_ranges, ublox_ranges
 from importers.log import Table
+from importers.range_epochs import flatten_epochs
 from importers.range_rows import Applied, satellite_names
 from navreplay.timeline import Floats
 
-__all__ = ["RANGE_TYPES", "flatten_epochs", "range_table"]
+__all__ = ["RANGE_TYPES", "range_table"]
 
-NO_SATELLITES = "epoch without satellites"
 _NUMBERS = {
     "pseudorange": "pseudorange_m",
     "range_rate": "range_rate_mps",
@@ -27,20 +28,6 @@ def range_table(type: str, table: Table) -> Table:
     """A table with one row per observation, columns as `importers.range_rows.range_rows` takes them. read counts observations
     and the messages that hold none. Raises KeyError where the type's fields are missing."""
     return RANGE_TYPES[type.replace("/msg/", "/")](table)
-
-
-def flatten_epochs(
-    table: Table, epochs: Sequence[Sequence[Any]], columns: Callable[[list[Any], np.ndarray], dict[str, np.ndarray]]
-) -> Table:
-    """A table of n messages with a row per observation. epochs: (n,) the observations of each message. columns: makes the
-    columns of all m observations, given them and the message (m,) that each is of."""
-    counts = np.array([len(epoch) for epoch in epochs], dtype=np.int64)
-    message = np.repeat(np.arange(len(epochs)), counts)
-    flat = columns([item for epoch in epochs for item in epoch], message)
-    rejected = dict(table.rejected)
-    if (counts == 0).any():
-        rejected[NO_SATELLITES] = int((counts == 0).sum())
-    return Table(flat["t_gps_ns"], flat, len(message) + sum(rejected.values()), rejected)
 
 
 def _as_they_are(table: Table) -> Table:
@@ -101,8 +88,12 @@ def _vectors(values: Sequence[Any]) -> Floats:
 
 RANGE_TYPES: Mapping[str, Callable[[Table], Table]] = {
     "csv/range": _as_they_are,
+    "navreplay/range": _as_they_are,
+    "smartphone": _as_they_are,
     "rinex/observation": _as_they_are,
     "ubx/RXM-RAWX": _as_they_are,
     "navreplay.GnssRanges": _own,
+    "gnss_comm/GnssMeasMsg": gnss_comm_ranges,
+    "ublox_msgs/RxmRAWX": ublox_ranges,
 }
 """By type (without the ``/msg/`` of ROS 2), what makes a table per observation of the table of its messages."""

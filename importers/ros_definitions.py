@@ -41,8 +41,8 @@ _DTYPES = {
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RosType:
-    """A message type ready for decoding. leaves: its columns; arrays of messages have none. fixed: True when the leaves are
-    all there is and only strings vary in length."""
+    """A message type ready for decoding. leaves: its columns; arrays of messages are one of objects. fixed: True when only
+    strings vary in length."""
 
     name: str
     store: Typestore
@@ -94,7 +94,7 @@ def _parse(name: str, definition: str, language: str) -> Typestore:
 
 
 def _flatten(store: Typestore, name: str, path: str, attribute: str, leaves: list[Leaf]) -> bool:
-    """Append the leaves of a type; False when something in it varies in length or has no column."""
+    """Append the leaves of a type; False when something in it varies in length."""
     fixed = True
     field: str
     node: int
@@ -112,7 +112,8 @@ def _flatten(store: Typestore, name: str, path: str, attribute: str, leaves: lis
                 fixed &= _flatten(store, detail, f"{where}.", f"{attr}.", leaves)
             continue
         if node in (Nodetype.ARRAY, Nodetype.SEQUENCE) and detail[0][0] == Nodetype.NAME:
-            _flatten(store, detail[0][1], "", "", [])  # no column, but what it is made of must be known
+            _flatten(store, detail[0][1], "", "", [])  # what it is made of must be known
+            leaves.append(Leaf(where, (attr,), Kind.MESSAGES, np.dtype(object)))
             fixed = False
             continue
         leaf = _leaf(node, detail, where, attr)

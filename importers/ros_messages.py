@@ -20,7 +20,7 @@ class RosDecoder:
     """Decodes the messages of one channel.
 
     Layouts found are kept and tried first on the next block; a channel with more than a few layouts (strings of ever new
-    length) goes on message by message. Arrays of variable length are object columns, arrays of messages are left out.
+    length) goes on message by message. Arrays of variable length, and arrays of messages, are object columns.
     """
 
     def __init__(self, ros_type: RosType, encoding: str) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 
 from navreplay.timeline import Floats
 
-__all__ = ["DEFAULT_SIGNALS", "SPEED_OF_LIGHT", "carrier_hz", "rank_signals"]
+__all__ = ["DEFAULT_SIGNALS", "SPEED_OF_LIGHT", "carrier_hz", "nearest_signal", "rank_signals"]
 
 SPEED_OF_LIGHT = 299_792_458.0
 """[m/s]."""
@@ -29,6 +29,7 @@ _MHZ = {
     "J": {"1": 1575.42, "2": 1227.60, "5": 1176.45, "6": 1278.75},
 }
 _B1I_OF_RINEX_302 = "1I"
+_BAND_HZ = 5e6
 _GLONASS_STEP_MHZ = {"1": 0.5625, "2": 0.4375}
 
 
@@ -56,3 +57,19 @@ def rank_signals(sat: np.ndarray, signal: np.ndarray, preferred: Mapping[Any, Se
     texts, inverse = np.unique(keys, return_inverse=True)
     ranks = [order[text[0]].index(text[1:]) if text[:1] in order and text[1:] in order[text[0]] else -1 for text in texts]
     return np.array(ranks, dtype=np.int64)[inverse]
+
+
+def nearest_signal(sat: np.ndarray, carrier: Floats) -> np.ndarray:
+    """Codes (n,) of the usual signal on carriers (n,) [Hz] of satellites (n,): that of `DEFAULT_SIGNALS` where the band has
+    one, else the band with ``X``; empty where there is no such band."""
+    out = np.full(len(sat), "", dtype="U2")
+    system = sat.astype("U1")
+    for name, bands in _MHZ.items():
+        codes = [next((code for code in DEFAULT_SIGNALS[name] if code[0] == band), f"{band}X") for band in bands]
+        centres = np.array(list(bands.values())) * 1e6
+        rows = np.flatnonzero((system == name) & np.isfinite(carrier))
+        apart = np.abs(carrier[rows, None] - centres)
+        nearest = apart.argmin(axis=1)
+        close = apart[np.arange(len(rows)), nearest] < _BAND_HZ
+        out[rows[close]] = np.array(codes)[nearest[close]]
+    return out
