@@ -26,6 +26,7 @@ _LIMIT = 3.3
 """Normalised residual beyond which a measurement is excluded: one good one in a thousand is."""
 _MOST_EXCLUDED = 12
 _WORST_DILUTION = 20.0
+_GOOD_DILUTION = 6.0
 _LEAST_RADIUS, _LARGEST_RADIUS = 6.0e6, 9.0e6
 
 
@@ -55,6 +56,14 @@ class PointSolution:
     def solved(self) -> NDArray[np.bool_]:
         """(e,) epochs with a position."""
         return np.asarray(np.isfinite(self.pos_e[:, 0]))
+
+    @property
+    def trusted(self) -> NDArray[np.bool_]:
+        """(e,) epochs whose position a faulty satellite could not have bent unseen: two more are there than are needed, well
+        spread. All that are solved, where there is no such epoch."""
+        spare = self.used - 3 - np.isfinite(self.clock).sum(axis=1)
+        good = self.solved & (spare >= 2) & (self.dop[:, 1] < _GOOD_DILUTION)
+        return np.asarray(good if good.any() else self.solved)
 
 
 class _Padded(NamedTuple):
@@ -107,8 +116,8 @@ def interpolate_positions(t_ns: Times, pos_e: Floats) -> Floats:
 
 
 def fixes_of(points: PointSolution) -> GnssFixSeries:
-    """The solved epochs as fixes of a single-point receiver. Raises LogError when there are none."""
-    solved = np.flatnonzero(points.solved)
+    """The trusted epochs as fixes of a single-point receiver. Raises LogError when there are none."""
+    solved = np.flatnonzero(points.trusted)
     if not len(solved):
         raise LogError("ranges: no epoch gives a position after faulty satellites are excluded")
     lla = earth.lla_from_ecef(points.pos_e[solved])

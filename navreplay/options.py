@@ -99,8 +99,9 @@ class RangeOptions:
     """Pseudoranges, range rates, and the receiver clock.
 
     Where the receiver reports no standard deviation that is positive, a measurement's is pseudorange_std [m] or range_rate_std
-    [m/s], which hold at the zenith and from cn0_reference [dB-Hz] up, divided by the sine of the elevation and multiplied by
-    10^((cn0_reference - C/N0) / 20) for a weaker signal. pseudorange_std_floor, range_rate_std_floor: least ones believed.
+    [m/s], those of a strong signal from the zenith, times sqrt(1 + 10^((cn0_reference - C/N0) / 10)) / sin(elevation): its
+    variance doubles at cn0_reference [dB-Hz] (SIGMA-epsilon model, Hartinger and Brunner, GPS Solutions 2(4) (1999) 35).
+    pseudorange_std_floor, range_rate_std_floor: least ones believed.
     Not used: satellites below elevation_mask [rad], signals below cn0_mask [dB-Hz], and, where systems names any, satellites
     of other systems than these RINEX letters. ionosphere, troposphere: correct for them what is not yet corrected.
     clock_noise [m/sqrt(s)] and clock_drift_walk [m/s/sqrt(s)]: white noise of the receiver clock's frequency, and its random
@@ -108,13 +109,13 @@ class RangeOptions:
     system_offset_walk [m/sqrt(s)]: its random walk. clock_jump [m]: a common jump of all pseudoranges beyond it is the clock's.
     """
 
-    pseudorange_std: float = 1.5
+    pseudorange_std: float = 1.0
     range_rate_std: float = 0.05
     pseudorange_std_floor: float = 0.3
     range_rate_std_floor: float = 0.01
-    cn0_reference: float = 45.0
+    cn0_reference: float = 38.0
     elevation_mask: float = 10 * _DEG
-    cn0_mask: float = 20.0
+    cn0_mask: float = 30.0
     systems: str = ""
     ionosphere: bool = True
     troposphere: bool = True
@@ -143,7 +144,7 @@ class FilterOptions:
     covariance propagation. use_velocity: take GNSS velocity where the log has it. noise_scale multiplies the standard
     deviations of all GNSS measurements. position_std_floor [m], velocity_std_floor [m/s]: least standard deviations believed.
     default_position_std, default_velocity_std: (horizontal, vertical) by name of FixStatus where the covariance is unknown.
-    use: what aids the filter; ``auto`` takes ranges where the log has them.
+    use: what aids the filter; ``auto`` takes ranges where the log has them. smooth: carry all measurements backward as well.
     """
 
     imu_noise: ImuNoise = GRADES["consumer"]
@@ -168,5 +169,6 @@ class FilterOptions:
     )
     default_velocity_std: tuple[float, float] = (0.1, 0.2)
     use: Literal["auto", "fixes", "ranges"] = "auto"
+    smooth: bool = False
     ranges: RangeOptions = RangeOptions()
     motion: MotionOptions = MotionOptions()

@@ -144,9 +144,9 @@ def correct_ranges(
         tow_s = (epochs.t_ns[epochs.epoch_of] % _WEEK_NS) / 1e9
         l1 = klobuchar_delay(ranges.klobuchar, lla[:, 0], lla[:, 1], elevation, azimuth, tow_s)
         delay += l1 / epochs.carrier**2
-    # a signal of unknown strength counts as one at the reference
-    fade = 10 ** (np.maximum(options.cn0_reference - np.nan_to_num(epochs.cn0, nan=options.cn0_reference), 0) / 20)
-    factor = fade / np.sin(np.maximum(elevation, np.radians(3.0)))
+    # a signal of unknown strength counts as a strong one
+    weakness = 10 ** ((options.cn0_reference - np.nan_to_num(epochs.cn0, nan=np.inf)) / 10)
+    factor = np.sqrt(1 + weakness) / np.sin(np.maximum(elevation, np.radians(3.0)))
     pseudorange_std = _believe(epochs.pseudorange_std, options.pseudorange_std * factor, options.pseudorange_std_floor)
     rate_std = _believe(epochs.range_rate_std, options.range_rate_std * factor, options.range_rate_std_floor)
     corrected = replace(

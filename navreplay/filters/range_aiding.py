@@ -31,7 +31,7 @@ _DRIFT_STD = 10.0
 class RangeAiding:
     """Ranges of one receiver, carried by an IMU (has_imu) or moving freely.
 
-    fixes: least-squares positions of the epochs that allow them, from which a filter is aligned and started.
+    fixes: least-squares positions of the epochs that are trusted with it, from which a filter is aligned and started.
     """
 
     name = "ranges"
@@ -76,7 +76,7 @@ class RangeAiding:
     def _with_clock(self, fix: int, state: NavState, cov: Floats) -> tuple[NavState, Floats]:
         """The clock of a fix's epoch put behind state and cov, with the covariances it has with the position."""
         points = self._points
-        epoch = int(np.flatnonzero(points.solved)[fix])
+        epoch = int(np.flatnonzero(points.trusted)[fix])
         n, offsets = len(cov), points.clock[epoch]
         seen = np.isfinite(offsets)
         full = np.zeros((self.model.size, self.model.size))
