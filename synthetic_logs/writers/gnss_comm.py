@@ -28,6 +28,18 @@ _EPHEMERIS_FIELDS = (
     *("ura", "A", "e", "i0", "omg", "OMG0", "M0", "delta_n", "OMG_dot", "i_dot", "cuc", "cus", "crc", "crs", "cic", "cis"),
     *("af0", "af1", "af2", "tgd0", "tgd1", "A_dot", "n_dot"),
 )
+_ELEMENTS = {
+    "e": "eccentricity",
+    "i0": "inclination",
+    "omg": "perigee",
+    "M0": "mean_anomaly",
+    "delta_n": "delta_n",
+    "OMG_dot": "node_rate",
+    "i_dot": "inclination_rate",
+    **{name: name for name in ("cuc", "cus", "crc", "crs", "cic", "cis", "af0", "af1")},
+    "tgd0": "group_delay",
+}
+"""Fields that hold an element of `synthetic_logs.constellation.Orbits` as it is."""
 _OBSERVED = ("freqs", "CN0", "LLI", "code", "psr", "psr_std", "cp", "cp_std", "dopp", "dopp_std", "status")
 _BYTES = ("LLI", "code", "status")
 DEFINITIONS = {
@@ -97,13 +109,7 @@ def _ephemeris(store: Typestore, system: str, issue: Orbits, row: int) -> Any:
     toe = _time(store, issue.reference_ns)
     own_week, own_tow = divmod(issue.reference_ns // _S - AHEAD_S[system], WEEK_S)
     number = own_tow // 3600
-    second_delay = issue.group_delay[row] if system == "E" else 0.0
-    values = (
-        *(2.0, issue.sqrt_a[row] ** 2, issue.eccentricity[row], issue.inclination[row], issue.perigee[row]),
-        *(ascending_node(issue, AHEAD_S[system])[row], issue.mean_anomaly[row], issue.delta_n[row], issue.node_rate[row]),
-        *(issue.inclination_rate[row], issue.cuc[row], issue.cus[row], issue.crc[row], issue.crs[row], issue.cic[row]),
-        *(issue.cis[row], issue.af0[row], issue.af1[row], 0.0, issue.group_delay[row], second_delay, 0.0, 0.0),
-    )
+    elements = {name: float(getattr(issue, attribute)[row]) for name, attribute in _ELEMENTS.items()}
     return store.types[TOPICS["/ublox_driver/ephem"]](
         sat=satellite_number(str(issue.sat[row])),
         ttr=_time(store, issue.reference_ns - 3600 * _S),
@@ -115,7 +121,14 @@ def _ephemeris(store: Typestore, system: str, issue: Orbits, row: int) -> Any:
         iodc=number,
         health=0,
         code=0,
-        **dict(zip(_EPHEMERIS_FIELDS, map(float, values), strict=True)),
+        ura=2.0,
+        A=float(issue.sqrt_a[row] ** 2),
+        OMG0=float(ascending_node(issue, AHEAD_S[system])[row]),
+        af2=0.0,
+        tgd1=float(issue.group_delay[row]) if system == "E" else 0.0,
+        A_dot=0.0,
+        n_dot=0.0,
+        **elements,
     )
 
 
