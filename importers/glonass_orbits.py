@@ -19,13 +19,14 @@ _STEP_S = 60.0
 _NODES = 32
 
 
-def glonass_clock(records: NDArray[np.void], t_ns: Times, before_s: Floats) -> Floats:
-    """Clock offsets (n,) [s] at satellite clock time before_s (n,) before t_ns (n,)."""
-    sent = (t_ns - records["toe_ns"]) * 1e-9 - before_s
+def glonass_clock(records: NDArray[np.void], index: NDArray[np.intp], t_ns: Times, before_s: Floats) -> Floats:
+    """Clock offsets (n,) [s] at satellite clock time before_s (n,) before t_ns (n,), from the records of index (n,)."""
+    tau, gamma = records["tau"][index], records["gamma"][index]
+    sent = (t_ns - records["toe_ns"][index]) * 1e-9 - before_s
     elapsed = sent
     for _ in range(2):
-        elapsed = sent + records["tau"] - records["gamma"] * elapsed
-    return -records["tau"] + records["gamma"] * elapsed
+        elapsed = sent + tau - gamma * elapsed
+    return gamma * elapsed - tau
 
 
 def glonass_states(

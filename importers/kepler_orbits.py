@@ -4,6 +4,8 @@ Sources: IS-GPS-200N, 20.3.3.3 and 20.3.3.4; Galileo OS SIS ICD 2.1, 5.1; BDS-SI
 geostationary satellites). Velocities are the time derivatives of the position formulas.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,45 +22,46 @@ _GEO_NUMBERS = (1, 2, 3, 4, 5, 59, 60, 61, 62, 63)
 _MAX_ITERATIONS = 12
 
 
-def kepler_clock(records: NDArray[np.void], t_ns: Times, before_s: Floats) -> Floats:
-    """Clock offsets (n,) [s], without relativity, at satellite clock time before_s (n,) before t_ns (n,)."""
-    sent = (t_ns - records["toc_ns"]) * 1e-9 - before_s
+def kepler_clock(records: NDArray[np.void], index: NDArray[np.intp], t_ns: Times, before_s: Floats) -> Floats:
+    """Clock offsets (n,) [s], without relativity, at satellite clock time before_s (n,) before t_ns (n,), from the records of
+    index (n,)."""
+    polynomial = [records[name][index] for name in ("af0", "af1", "af2")]
+    sent = (t_ns - records["toc_ns"][index]) * 1e-9 - before_s
     elapsed = sent
     for _ in range(2):
-        elapsed = sent - _polynomial(records, elapsed)
-    return _polynomial(records, elapsed)
+        elapsed = sent - _polynomial(polynomial, elapsed)
+    return _polynomial(polynomial, elapsed)
 
 
-def kepler_states(records: NDArray[np.void], t_ns: Times, before_s: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+def kepler_states(
+    records: NDArray[np.void], index: NDArray[np.intp], t_ns: Times, before_s: Floats
+) -> tuple[Floats, Floats, Floats, Floats]:
     """Positions (n, 3), velocities (n, 3) in Earth-fixed axes of that time, clock offsets (n,) [s] and drifts (n,) with
-    relativity, each from its record (n,), before_s (n,) before the GPS times t_ns (n,)."""
-    gm, rate = (_by_system(records["sat"], values) for values in (_GM, _EARTH_RATE))
-    tk = (t_ns - records["toe_ns"]) * 1e-9 - before_s
-    e, a = records["e"], records["sqrt_a"] ** 2
-    n = np.sqrt(gm / a**3) + records["delta_n"]
-    anomaly = _eccentric_anomaly(records["m0"] + n * tk, e)
-    sin_e, cos_e = np.sin(anomaly), np.cos(anomaly)
-    anomaly_rate = n / (1 - e * cos_e)
-    plane, plane_rate, inclination, inclination_rate = _in_plane(records, tk, sin_e, cos_e, anomaly_rate)
+    relativity, from the records of index (n,), before_s (n,) before the GPS times t_ns (n,)."""
+    system = records["sat"].astype("U1")
+    gm, rate = (np.select([system == name for name in values], list(values.values()), np.nan) for values in (_GM, _EARTH_RATE))
     geo = np.isin(records["sat"], [f"C{number:02d}" for number in _GEO_NUMBERS])
-    node_rate = records["omega_dot"] - np.where(geo, 0.0, rate)
-    node = records["omega0"] + node_rate * tk - rate * records["toe_sow"]
+    motion = (np.sqrt(gm / records["sqrt_a"] ** 6) + records["delta_n"])[index]
+    tk = (t_ns - records["toe_ns"][index]) * 1e-9 - before_s
+    e = records["e"][index]
+    anomaly = _eccentric_anomaly(records["m0"][index] + motion * tk, e)
+    sin_e, cos_e = np.sin(anomaly), np.cos(anomaly)
+    anomaly_rate = motion / (1 - e * cos_e)
+    plane, plane_rate, inclination, inclination_rate = _in_plane(records, index, tk, sin_e, cos_e, anomaly_rate)
+    node_rate = (records["omega_dot"] - np.where(geo, 0.0, rate))[index]
+    node = (records["omega0"] - rate * records["toe_sow"])[index] + node_rate * tk
     pos, vel = _to_earth(plane, plane_rate, inclination, inclination_rate, node, node_rate)
-    if geo.any():
-        pos[geo], vel[geo] = _turn_geostationary(pos[geo], vel[geo], rate[geo], tk[geo])
-    scale = -2 * np.sqrt(gm * a) * e / SPEED_OF_LIGHT**2
-    elapsed = (t_ns - records["toc_ns"]) * 1e-9 - before_s
-    clock = _polynomial(records, elapsed) + scale * sin_e
-    return pos, vel, clock, records["af1"] + 2 * records["af2"] * elapsed + scale * cos_e * anomaly_rate
+    turned = np.flatnonzero(geo[index])
+    pos[turned], vel[turned] = _turn_geostationary(pos[turned], vel[turned], rate[index[turned]], tk[turned])
+    scale = (-2 * np.sqrt(gm) * records["sqrt_a"] * records["e"] / SPEED_OF_LIGHT**2)[index]
+    elapsed = (t_ns - records["toc_ns"][index]) * 1e-9 - before_s
+    polynomial = [records[name][index] for name in ("af0", "af1", "af2")]
+    clock = _polynomial(polynomial, elapsed) + scale * sin_e
+    return pos, vel, clock, polynomial[1] + 2 * polynomial[2] * elapsed + scale * cos_e * anomaly_rate
 
 
-def _by_system(sat: np.ndarray, values: dict[str, float]) -> Floats:
-    system = sat.astype("U1")
-    return np.select([system == name for name in values], list(values.values()), np.nan)
-
-
-def _polynomial(records: NDArray[np.void], elapsed: Floats) -> Floats:
-    return records["af0"] + elapsed * (records["af1"] + elapsed * records["af2"])
+def _polynomial(coefficients: Sequence[Floats], elapsed: Floats) -> Floats:
+    return coefficients[0] + elapsed * (coefficients[1] + elapsed * coefficients[2])
 
 
 def _eccentric_anomaly(mean: Floats, e: Floats) -> Floats:
@@ -73,21 +76,22 @@ def _eccentric_anomaly(mean: Floats, e: Floats) -> Floats:
 
 
 def _in_plane(
-    records: NDArray[np.void], tk: Floats, sin_e: Floats, cos_e: Floats, anomaly_rate: Floats
+    records: NDArray[np.void], index: NDArray[np.intp], tk: Floats, sin_e: Floats, cos_e: Floats, anomaly_rate: Floats
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Position and velocity (2, n) in the plane of the orbit, inclination and its rate (n,), with harmonic corrections."""
-    e, a = records["e"], records["sqrt_a"] ** 2
+    cus, cuc, crs, crc, cis, cic = (records[name][index] for name in ("cus", "cuc", "crs", "crc", "cis", "cic"))
+    e, a, idot = records["e"][index], (records["sqrt_a"] ** 2)[index], records["idot"][index]
     root = np.sqrt(1 - e**2)
-    latitude = np.arctan2(root * sin_e, cos_e - e) + records["omega"]
+    latitude = np.arctan2(root * sin_e, cos_e - e) + records["omega"][index]
     latitude_rate = root * anomaly_rate / (1 - e * cos_e)
     sin2, cos2 = np.sin(2 * latitude), np.cos(2 * latitude)
-    u = latitude + records["cus"] * sin2 + records["cuc"] * cos2
-    r = a * (1 - e * cos_e) + records["crs"] * sin2 + records["crc"] * cos2
-    inclination = records["i0"] + records["idot"] * tk + records["cis"] * sin2 + records["cic"] * cos2
+    u = latitude + cus * sin2 + cuc * cos2
+    r = a * (1 - e * cos_e) + crs * sin2 + crc * cos2
+    inclination = records["i0"][index] + idot * tk + cis * sin2 + cic * cos2
     twice = 2 * latitude_rate
-    u_rate = latitude_rate + twice * (records["cus"] * cos2 - records["cuc"] * sin2)
-    r_rate = a * e * sin_e * anomaly_rate + twice * (records["crs"] * cos2 - records["crc"] * sin2)
-    inclination_rate = records["idot"] + twice * (records["cis"] * cos2 - records["cic"] * sin2)
+    u_rate = latitude_rate + twice * (cus * cos2 - cuc * sin2)
+    r_rate = a * e * sin_e * anomaly_rate + twice * (crs * cos2 - crc * sin2)
+    inclination_rate = idot + twice * (cis * cos2 - cic * sin2)
     sin_u, cos_u = np.sin(u), np.cos(u)
     plane = np.stack([r * cos_u, r * sin_u])
     plane_rate = np.stack([r_rate * cos_u - r * u_rate * sin_u, r_rate * sin_u + r * u_rate * cos_u])

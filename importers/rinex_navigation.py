@@ -41,7 +41,7 @@ def read_rinex_navigation(path: str, leap: LeapSeconds) -> Table:
     system = text.lines.field(start, 0, 1)[:, 0]
     names = satellite_names(text.lines.field(start, 0, 3).copy().view("S3")[:, 0].astype("U3") if len(start) else np.empty(0))
     needed = np.array([_LINES.get(chr(code), 0) for code in system], dtype=np.int64)
-    other = (names == "") | ~np.isin(message, ["", *_MESSAGES])
+    other = (names == "") | (needed == 0) | ~np.isin(message, ["", *_MESSAGES])
     cut = ~other & (count < needed)
     usable = ~other & ~cut
     kepler = np.zeros(int(usable.sum()), KEPLER)

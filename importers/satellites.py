@@ -76,19 +76,19 @@ def _fill_broadcast(
     rows, index = rows[known & valid], index[known & valid]
     if len(rows) == 0:
         return
-    chosen, when, flight = records[index], t_ns[rows], flight_s[rows]
+    when, flight = t_ns[rows], flight_s[rows]
     with np.errstate(all="ignore"):  # damaged records give NaN, which is told as a fault
         if "pos" in (records.dtype.names or ()):
-            before = flight + glonass_clock(chosen, when, flight)
+            before = flight + glonass_clock(records, index, when, flight)
             pos, vel, clock, drift = glonass_states(records, index, when, before)
         else:
-            before = flight + kepler_clock(chosen, when, flight)
-            pos, vel, clock, drift = kepler_states(chosen, when, before)
-            clock = clock - _group_delay(chosen, signal[rows])
+            before = flight + kepler_clock(records, index, when, flight)
+            pos, vel, clock, drift = kepler_states(records, index, when, before)
+            clock = clock - _group_delay(records, index, signal[rows])
     states.pos[rows], states.vel[rows], states.clock[rows], states.drift[rows] = pos, vel, clock, drift
-    system = sat[rows].astype("U1")
+    system = records["sat"].astype("U1")
     mask = np.select([system == name for name in _HEALTH_BITS], list(_HEALTH_BITS.values()), 0)
-    states.fault[rows] = np.where(chosen["health"] & mask, _UNHEALTHY, 0)
+    states.fault[rows] = np.where(((records["health"] & mask) != 0)[index], _UNHEALTHY, 0)
 
 
 def _fill_precise(
@@ -105,19 +105,25 @@ def _fill_precise(
     clock = clock + relativity
     index, valid = nearest_records(ephemerides.kepler, sat, t_ns)
     delayed = known & (index >= 0) & valid
-    clock[delayed] -= _group_delay(ephemerides.kepler[index[delayed]], signal[delayed])
+    clock[delayed] -= _group_delay(ephemerides.kepler, index[delayed], signal[delayed])
     states.pos[known], states.vel[known] = pos[known], vel[known]
     states.clock[known], states.drift[known] = clock[known], np.nan_to_num(drift[known])
     states.fault[known] = 0
 
 
-def _group_delay(records: NDArray[np.void], signal: np.ndarray) -> Floats:
-    """Delay (n,) [s] of a signal against what the broadcast clock describes. GPS, QZSS, Galileo: it grows with the inverse
-    square of the carrier (IS-GPS-200N, 20.3.3.3.3.2). BeiDou: TGD1 for B1, TGD2 for B2I, none for B3I, on which its clock
-    rests."""
-    system, band = records["sat"].astype("U1"), signal.astype("U2").view("U1").reshape(-1, 2)[:, 0]
-    carrier = carrier_hz(records["sat"], signal)
-    ratio = np.nan_to_num((1575.42e6 / carrier) ** 2, nan=1.0)
+def _group_delay(records: NDArray[np.void], index: NDArray[np.intp], signal: np.ndarray) -> Floats:
+    """Delay (n,) [s] of a signal (n,) against what the clock of its record describes. GPS, QZSS, Galileo: it grows with the
+    inverse square of the carrier (IS-GPS-200N, 20.3.3.3.3.2). BeiDou: TGD1 for B1, TGD2 for B2I, none for B3I, on which its
+    clock rests."""
+    names, code = np.unique(signal, return_inverse=True)
+    table = np.stack([_record_delays(records, str(name)) for name in names], axis=1)
+    return np.asarray(table[index, code])
+
+
+def _record_delays(records: NDArray[np.void], signal: str) -> Floats:
+    """Delays (m,) of one kind of signal by all records."""
+    system = records["sat"].astype("U1")
+    ratio = np.nan_to_num((1575.42e6 / carrier_hz(records["sat"], np.full(len(records), signal))) ** 2, nan=1.0)
     galileo = np.where(records["fnav"], records["tgd"][:, 0], records["tgd"][:, 1])
-    beidou = np.select([np.isin(band, ["1", "2"]), band == "7"], [records["tgd"][:, 0], records["tgd"][:, 1]], 0.0)
+    beidou = records["tgd"][:, 0] if signal[:1] in ("1", "2") else records["tgd"][:, 1] * (signal[:1] == "7")
     return np.select([system == "E", system == "C"], [ratio * galileo, beidou], ratio * records["tgd"][:, 0])
