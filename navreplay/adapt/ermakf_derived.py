@@ -13,8 +13,10 @@ R says how large the errors are, not that they stay: a filter that takes correla
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from navreplay.adapt.adapter import Adaptation
 from navreplay.adapt.ratio import scale_noise
@@ -31,18 +33,24 @@ _TIME_CONSTANTS = np.array([0.1, 1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0
 def lag_variances(differences: Floats, count: Floats, lags: int) -> Floats:
     """(k, lags) half the mean square of the differences over L = 1 .. lags epochs, NaN where a row has too few.
 
-    differences (k, n) over one epoch each, of which the last count (k,) are known and the others zero.
+    differences (k, n) over one epoch each, of which the last count (k,) are known and the others zero; lags at most n.
     """
     k, n = differences.shape
     path = np.concatenate([np.zeros((k, 1)), np.cumsum(differences, axis=1)], axis=1)
-    sums = np.array(
-        [
-            ((path[:, lag:] - path[:, :-lag]) ** 2 * (np.arange(n + 1 - lag) >= n - count[:, None])).sum(axis=1)
-            for lag in range(1, lags + 1)
-        ]
-    ).T
+    start, end, firsts = _pairs(n + 1, lags)
+    squares = (path[:, end] - path[:, start]) ** 2
+    squares *= start >= n - count[:, None]
     known = count[:, None] + 1 - np.arange(1, lags + 1)
-    return np.where(known > 0, sums / (2 * np.maximum(known, 1)), np.nan)
+    return np.where(known > 0, np.add.reduceat(squares, firsts, axis=1) / (2 * np.maximum(known, 1)), np.nan)
+
+
+@lru_cache(maxsize=8)
+def _pairs(length: int, lags: int) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+    """Indices of both ends of all pairs 1 .. lags apart in a sequence, lag by lag, and where each lag begins."""
+    starts = [np.arange(length - lag) for lag in range(1, lags + 1)]
+    ends = [start + lag for lag, start in enumerate(starts, 1)]
+    firsts = np.cumsum([0, *(len(start) for start in starts[:-1])])
+    return np.concatenate(starts), np.concatenate(ends), firsts
 
 
 def fit_correlation(variances: Floats, longest: Floats) -> tuple[Floats, Floats]:

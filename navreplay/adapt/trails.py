@@ -4,11 +4,12 @@ Ge et al., Sensors 20 (2020) 6041, (12)-(14): d_k = (zG_k - zG_k-1) - (zI_k - zI
 not reach over a correction, so it is h(x_k|k-1) - h(x_k-1|k-1), and d_k is the residual of now against the prediction less
 the residual of the last epoch against the corrected state (`Innovation.leftover`).
 The paper's steady errors leave the differences, but a receiver clock's drift is not steady: what all pseudoranges, or all
-range rates, of an epoch share is taken out of them as their median, which makes the variance of n of them low by about
-0.4 / n. Where fewer than four are there, what the filter predicts of the clock has to do.
+range rates, of an epoch share is taken out of them (`remove_common`). Where fewer than four are there, what the filter
+predicts of the clock has to do.
 """
 
 from collections.abc import Mapping
+from math import isfinite, nan
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +19,7 @@ from navreplay.timeline import Floats
 
 __all__ = ["Trail", "Trails", "extend_trails", "remove_common", "stack_trails"]
 
-_CLOCKED = ("range", "range_rate")
+_CLOCKED = ("range ", "range_rate ")
 _LEAST_SHARED = 4
 
 
@@ -36,25 +37,39 @@ class Trail(NamedTuple):
 Trails = Mapping[str, Trail]
 
 
-def remove_common(labels: tuple[str, ...], values: Floats) -> Floats:
-    """values (m,) of an epoch less what the receiver clock adds to all of a kind; NaN stand for unknown ones and stay."""
-    kinds = np.array([label.partition(" ")[0] for label in labels])
+def remove_common(labels: tuple[str, ...], values: Floats, variances: Floats) -> Floats:
+    """values (m,) of an epoch less what the receiver clock adds to all of a kind; NaN stand for unknown ones and stay.
+
+    The common part is the mean weighted by variances (m,) without those further than four robust sigmas from the median. A mean,
+    since its sum over epochs is the mean of the sums, which no median's is: over many epochs that would look like correlated
+    noise. What is left is stretched to the variance that it had with its own share in the mean.
+    """
     result = values.copy()
     for kind in _CLOCKED:
-        rows = np.flatnonzero((kinds == kind) & np.isfinite(values))
+        rows = [i for i, label in enumerate(labels) if label.startswith(kind) and values[i] == values[i]]
         if len(rows) >= _LEAST_SHARED:
-            result[rows] -= np.median(values[rows])
+            result[rows] = _centre(values[rows], variances[rows])
     return result
+
+
+def _centre(x: Floats, variance: Floats) -> Floats:
+    middle = len(x) // 2
+    distance = np.abs(x - np.sort(x)[middle]) / np.sqrt(variance)
+    good = distance <= 4 * 1.4826 * np.sort(distance)[middle]
+    weight = np.where(good, 1 / variance, 0.0)
+    total = weight.sum()
+    left = variance + np.where(good, -1, 1) / total
+    return np.asarray((x - weight @ x / total) * np.sqrt(variance / left))
 
 
 def extend_trails(trails: Trails, innovation: Innovation, length: int, longest_step: float) -> dict[str, Trail]:
     """The trails (at most length differences) of the labels of this epoch; one whose last epoch is not the filter's last, or
     lies further back than longest_step [s], begins anew."""
-    told = np.diagonal(innovation.noise).tolist()
-    step = remove_common(innovation.labels, _difference(trails, innovation, longest_step)).tolist()
+    told = np.diagonal(innovation.noise)
+    step = remove_common(innovation.labels, _difference(trails, innovation, longest_step), told)
     extended = {}
-    for label, value, variance in zip(innovation.labels, step, told, strict=True):
-        if np.isfinite(value):
+    for label, value, variance in zip(innovation.labels, step.tolist(), told.tolist(), strict=True):
+        if isfinite(value):
             last = trails[label]
             scaled = value / ((variance + last.told) / 2) ** 0.5
             extended[label] = Trail((*last.differences, scaled)[-length:], last.doubtful, innovation.t_ns, variance)
@@ -66,19 +81,20 @@ def extend_trails(trails: Trails, innovation: Innovation, length: int, longest_s
 def _difference(trails: Trails, innovation: Innovation, longest_step: float) -> Floats:
     """(m,) residual of now less that behind the last update; NaN where there is none to compare with."""
     leftover = innovation.leftover
-    step = np.full(len(innovation.labels), np.nan)
     if leftover is None or innovation.t_ns - leftover.t_ns > longest_step * 1e9:
-        return step
-    for i, label in enumerate(innovation.labels):
-        if label in trails and trails[label].t_ns == leftover.t_ns:
-            step[i] = innovation.residual[i] - leftover.residual[label]
-    return step
+        return np.full(len(innovation.labels), np.nan)
+    before = [
+        leftover.residual[label] if label in trails and trails[label].t_ns == leftover.t_ns else nan
+        for label in innovation.labels
+    ]
+    return innovation.residual - before
 
 
 def stack_trails(trails: list[Trail], length: int) -> tuple[Floats, Floats]:
     """Differences (k, length), oldest first and zeros before them, and how many each trail has (k,)."""
     stacked = np.zeros((len(trails), length))
-    for row, trail in zip(stacked, trails, strict=True):
-        count = len(trail.differences)
-        row[length - count :] = trail.differences
-    return stacked, np.array([len(trail.differences) for trail in trails], dtype=np.float64)
+    counts = [len(trail.differences) for trail in trails]
+    for row, trail, count in zip(stacked, trails, counts, strict=True):
+        if count:
+            row[-count:] = trail.differences
+    return stacked, np.array(counts, dtype=np.float64)
