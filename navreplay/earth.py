@@ -25,6 +25,7 @@ __all__ = [
     "matrix_en",
     "move_lla",
     "ned_between",
+    "offset_between",
     "radii",
     "transport_rate_n",
 ]
@@ -135,3 +136,14 @@ def move_lla(lla: Floats, offset_n: Floats) -> Floats:
     height = lla[..., 2]
     scale = np.stack([1 / (meridian + height), 1 / ((normal + height) * np.cos(lla[..., 0])), -np.ones_like(height)], axis=-1)
     return np.asarray(lla + scale * offset_n)
+
+
+def offset_between(lla: Floats, moved: Floats) -> Floats:
+    """(..., 3) [m, NED] the offset by which `move_lla` takes lla (..., 3) to moved (..., 3)."""
+    lla = np.asarray(lla, dtype=np.float64)
+    meridian, normal = radii(lla[..., 0])
+    height = lla[..., 2]
+    metres = np.stack([meridian + height, (normal + height) * np.cos(lla[..., 0]), -np.ones_like(height)], axis=-1)
+    change = np.asarray(moved, dtype=np.float64) - lla
+    change[..., 1] = (change[..., 1] + np.pi) % (2 * np.pi) - np.pi
+    return np.asarray(change * metres)

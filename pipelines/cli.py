@@ -88,6 +88,7 @@ def _add_out(parser: argparse.ArgumentParser, metavar: str, text: str, required:
 def _add_processing(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--reference", metavar="FILE", type=Path, help="reference solution to compare with")
     parser.add_argument("--rate", metavar="HZ", type=float, help="rows of the solution between GNSS epochs")
+    parser.add_argument("--smooth", action="store_true", help="smooth: every row from the measurements before and behind it")
     parser.add_argument("--quiet", action="store_true", help="no progress bar, no summary")
     _add_json(parser)
     _add_out(parser, "OUT", "folder for the results")

@@ -157,6 +157,7 @@ class FilterSection(Section):
     parameters: Mapping[str, object] = Field(default_factory=dict, description="parameters of the method, by name")
     covariance_interval_s: Positive = Field(0.05, description="longest step of the covariance propagation [s]")
     use_velocity: bool = Field(True, description="use GNSS velocity where the log has it")
+    smooth: bool = Field(False, description="smooth: every row from the measurements before and behind it")
 
 
 class PositionStdSection(Section):

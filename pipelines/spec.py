@@ -59,6 +59,7 @@ def filter_options(config: Config) -> FilterOptions:
         output_rate=config.output.rate_hz,
         covariance_interval=config.filter.covariance_interval_s,
         use_velocity=config.filter.use_velocity,
+        smooth=config.filter.smooth,
         noise_scale=config.gnss.noise_scale,
         position_std_floor=config.gnss.position_std_floor_m,
         velocity_std_floor=config.gnss.velocity_std_floor_mps,

@@ -218,6 +218,22 @@ def test_noise_scale_scales_the_told_noise(log):
     np.testing.assert_allclose(scaled.innovations[0].nominal_std, 3 * plain.innovations[0].nominal_std)
 
 
+def test_smoothing_halves_the_errors_and_stays_consistent():
+    drive = synthetic_logs.simulate(SCENARIO, 4)
+    forward = run_filter(drive.timeline(), build_method("fixed"), options())
+    smoothed = run_filter(drive.timeline(), build_method("fixed"), options(smooth=True))
+    assert smoothed.method == "fixed-smoothed"
+    assert (smoothed.status == RowStatus.SMOOTHED).all()
+    np.testing.assert_array_equal(smoothed.t_ns, forward.t_ns)
+    np.testing.assert_allclose(smoothed.lla[-1], forward.lla[-1])
+    assert (smoothed.std[:, :9] <= forward.std[:, :9] * (1 + 1e-9)).all()
+    error, rows = errors(smoothed, drive.truth)
+    before, _ = errors(forward, drive.truth)
+    assert np.sqrt((error[:, :6] ** 2).mean()) < 0.7 * np.sqrt((before[:, :6] ** 2).mean())
+    nees = np.einsum("ki,kij,kj->k", error, np.linalg.inv(smoothed.cov[rows, :9, :9]), error)
+    assert 4 < nees.mean() < 18
+
+
 def test_progress_ends_with_one(log):
     shares: list[float] = []
     run_filter(log.timeline(), build_method("fixed"), options(), shares.append)

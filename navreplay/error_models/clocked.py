@@ -44,6 +44,10 @@ class ClockedModel:
         n = self.motion.size
         return replace(self.motion.retract(state, correction[:n]), clock=state.clock + correction[n:])
 
+    def difference(self, true: NavState, computed: NavState) -> Floats:
+        """(n + c,) the error by which `retract` takes computed to true."""
+        return np.concatenate([self.motion.difference(true, computed), true.clock - computed.clock])
+
     def propagate(
         self, state: NavState, cov: Floats, steps: Steps, first: int, ends: np.ndarray, interval: float, keep: bool = False
     ) -> Propagated:

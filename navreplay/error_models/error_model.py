@@ -33,6 +33,10 @@ class ErrorModel(Protocol):
         """The state moved by an estimated error (n,), true minus computed."""
         ...
 
+    def difference(self, true: NavState, computed: NavState) -> Floats:
+        """(n,) the error by which `retract` takes computed to true."""
+        ...
+
     def propagate(
         self, state: NavState, cov: Floats, steps: Steps, first: int, ends: np.ndarray, interval: float, keep: bool = False
     ) -> Propagated:

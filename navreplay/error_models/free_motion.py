@@ -69,6 +69,13 @@ class FreeMotionModel:
         )
         return self._face_course(moved)
 
+    def difference(self, true: NavState, computed: NavState) -> Floats:
+        """(n,) the error by which `retract` takes computed to true; attitude, which follows the course, does not count."""
+        parts = [earth.offset_between(computed.lla, true.lla), true.vel_n - computed.vel_n, np.zeros(3)]
+        if self.size > 9:
+            parts.append(true.acceleration - computed.acceleration)
+        return np.concatenate(parts)
+
     def propagate(
         self, state: NavState, cov: Floats, steps: Steps, first: int, ends: np.ndarray, interval: float, keep: bool = False
     ) -> Propagated:

@@ -136,6 +136,17 @@ class NedErrorModel:
             state.gyro_markov + markov,
         )
 
+    def difference(self, true: NavState, computed: NavState) -> Floats:
+        """(n,) the error by which `retract` takes computed to true."""
+        turn = rotation.quat_multiply(true.q_nb, rotation.quat_conjugate(computed.q_nb))
+        motion = [earth.offset_between(computed.lla, true.lla), true.vel_n - computed.vel_n, rotation.rotvec_from_quat(turn)]
+        sensors = [true.gyro_bias - computed.gyro_bias, true.accel_bias - computed.accel_bias]
+        if self.has_scale:
+            sensors += [true.gyro_scale - computed.gyro_scale, true.accel_scale - computed.accel_scale]
+        if self.has_markov:
+            sensors.append(true.gyro_markov - computed.gyro_markov)
+        return np.concatenate(motion + sensors)
+
     def propagate(
         self, state: NavState, cov: Floats, steps: Steps, first: int, ends: np.ndarray, interval: float, keep: bool = False
     ) -> Propagated:

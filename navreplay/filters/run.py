@@ -1,7 +1,6 @@
 """The epoch loop: inertial propagation to each measurement, then its update. There is no other."""
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 
@@ -13,11 +12,12 @@ from navreplay.filters.presets import Method
 from navreplay.filters.range_aiding import RangeAiding
 from navreplay.filters.range_gate import RangeGate
 from navreplay.filters.record import Recorder
+from navreplay.filters.rows import Rows
 from navreplay.filters.stretches import cut_at_gaps, tell_unreached
 from navreplay.filters.update import Updater
 from navreplay.heading import Sources
 from navreplay.options import FilterOptions
-from navreplay.solution import RowStatus, Solution
+from navreplay.solution import Solution
 from navreplay.strapdown import NavState, Steps, idle_steps, make_steps
 from navreplay.timeline import Floats, ImuSeries, LogError, Timeline, Times
 
@@ -26,26 +26,18 @@ __all__ = ["run_filter"]
 Progress = Callable[[float], None]
 
 
-class _Rows(NamedTuple):
-    """Output of one stretch: t_ns (k,), packed states (k, w), covariances (k, n, n), status (k,)."""
-
-    t_ns: Times
-    states: Floats
-    covariances: Floats
-    status: np.ndarray
-
-
 def run_filter(timeline: Timeline, method: Method, options: FilterOptions, progress: Progress | None = None) -> Solution:
-    """The forward solution over a timeline: of the IMU, by ranges or fixes; without IMU of the antenna, by ranges alone.
+    """The solution over a timeline: of the IMU, by ranges or fixes; without IMU of the antenna, by ranges alone.
 
     progress is called with the share done, from 0 to 1. Raises LogError without anything to aid by, or without IMU where there
     are only fixes; on a gap that the options refuse, or when no alignment is possible.
     """
     recorder = Recorder()
+    name = f"{method.name}-smoothed" if options.smooth else method.name
     if timeline.imu is None:
         alone = _choose_ranges_alone(timeline, options, recorder)
         rows = [_run_alone(alone, method, options, recorder, _report_of(alone.t_ns, progress))]
-        return _join(rows, f"{method.name} without IMU", alone.model, recorder)
+        return _join(rows, f"{name} without IMU", alone.model, recorder)
     aiding = _choose_aiding(timeline, options, recorder)
     stretches = cut_at_gaps(timeline.imu, options.gaps, recorder)
     tell_unreached(aiding.t_ns, aiding.name, stretches, recorder)
@@ -62,7 +54,7 @@ def run_filter(timeline: Timeline, method: Method, options: FilterOptions, progr
         report(int(stretch.t_ns[-1]))
     if not rows:
         raise LogError("filter: no stretch of the IMU could be aligned; see the gaps that `navreplay inspect` shows")
-    return _join(rows, method.name, aiding.model, recorder)
+    return _join(rows, name, aiding.model, recorder)
 
 
 def _report_of(t_ns: Times, progress: Progress | None) -> Callable[[int], None]:
@@ -97,7 +89,7 @@ def _choose_ranges_alone(timeline: Timeline, options: FilterOptions, recorder: R
     return RangeAiding(timeline.ranges, timeline.fix_lever_b, False, options, recorder)
 
 
-def _join(rows: list[_Rows], method: str, model: ErrorModel, recorder: Recorder) -> Solution:
+def _join(rows: list[Rows], method: str, model: ErrorModel, recorder: Recorder) -> Solution:
     states = np.concatenate([row.states for row in rows])
     return Solution(
         t_ns=np.concatenate([row.t_ns for row in rows]),
@@ -124,7 +116,7 @@ def _run_stretch(
     options: FilterOptions,
     recorder: Recorder,
     report: Callable[[int], None],
-) -> _Rows:
+) -> Rows:
     start = align(Sources(imu, aiding.fixes, timeline.attitude, timeline.reference, options.imu_noise, options.alignment))
     recorder.tell(start.t_ns, "info", start.text)
     for warning in start.warnings:
@@ -140,7 +132,7 @@ def _run_stretch(
 
 def _run_alone(
     aiding: RangeAiding, method: Method, options: FilterOptions, recorder: Recorder, report: Callable[[int], None]
-) -> _Rows:
+) -> Rows:
     start_ns, state, cov = aiding.start_alone()
     updater = Updater(aiding, RangeGate(options.gate), aiding.model, method, recorder)
     epochs = np.flatnonzero(aiding.t_ns > start_ns)
@@ -161,26 +153,27 @@ def _run_epochs(
     model: ErrorModel,
     options: FilterOptions,
     report: Callable[[int], None],
-) -> _Rows:
+) -> Rows:
     """From state and cov (n, n) at the beginning of the steps over all nodes (k,), with updates at t_ns[epochs]."""
     ends = np.searchsorted(steps.t_ns, nodes) + 1
-    rows = _allocate(np.concatenate([[steps.start_ns], nodes]).astype(np.int64), len(state.pack()), model.size)
-    rows.states[0], rows.covariances[0], rows.status[0] = state.pack(), cov, RowStatus.UPDATED
+    rows = Rows.allocate(np.concatenate([[steps.start_ns], nodes]).astype(np.int64), state, cov, options.smooth)
 
     # each epoch ends a run of nodes; behind the last epoch one more run may follow, without a measurement
     node, step = 0, 0
     stops = (np.searchsorted(nodes, t_ns[epochs]) + 1).tolist()
     for epoch, stop in zip([*epochs.tolist(), None], [*stops, len(nodes)], strict=True):
         if stop > node:
-            moved = model.propagate(state, cov, steps, step, ends[node:stop], options.covariance_interval)
-            rows.states[node + 1 : stop + 1], rows.covariances[node + 1 : stop + 1] = moved.states, moved.covariances
+            interval, keep = options.covariance_interval, options.smooth
+            moved = model.propagate(state, cov, steps, step, ends[node:stop], interval, keep)
+            rows.put(slice(node + 1, stop + 1), moved)
             state, cov = NavState.unpack(moved.states[-1]), moved.covariances[-1]
             node, step = stop, int(ends[stop - 1])
         if epoch is not None:
-            state, cov, status = updater.update(epoch, state, cov, steps.dtheta[step - 1], float(steps.dt[step - 1]))
-            rows.states[node], rows.covariances[node], rows.status[node] = state.pack(), cov, status
+            updated = updater.update(epoch, state, cov, steps.dtheta[step - 1], float(steps.dt[step - 1]))
+            rows.correct(node, updated)
+            state, cov = updated.state, updated.cov
             report(int(t_ns[epoch]))
-    return rows
+    return rows.smoothed(model) if options.smooth else rows
 
 
 def _output_times(start_ns: int, end_ns: int, rate: float) -> Times:
@@ -188,9 +181,3 @@ def _output_times(start_ns: int, end_ns: int, rate: float) -> Times:
         return np.empty(0, dtype=np.int64)
     period = round(1e9 / rate)
     return np.arange((start_ns // period + 1) * period, end_ns + 1, period, dtype=np.int64)
-
-
-def _allocate(t_ns: Times, width: int, size: int) -> _Rows:
-    k = len(t_ns)
-    status = np.full(k, RowStatus.PREDICTED, dtype=np.int8)
-    return _Rows(t_ns, np.empty((k, width)), np.empty((k, size, size)), status)

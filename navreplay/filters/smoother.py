@@ -5,34 +5,24 @@ closed-loop error state: the forward pass keeps at every node the state before a
 carries the difference between the smoothed and the predicted state of the node behind.
 """
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
+from navreplay.error_models.error_model import ErrorModel
 from navreplay.filters.core import symmetric
 from navreplay.strapdown import NavState
 from navreplay.timeline import Floats
 
-__all__ = ["ErrorState", "ForwardPass", "smooth"]
-
-
-class ErrorState(Protocol):
-    """What the smoother asks of an error model."""
-
-    def retract(self, state: NavState, correction: Floats) -> NavState:
-        """The state moved by an error (n,)."""
-        ...
-
-    def difference(self, true: NavState, computed: NavState) -> Floats:
-        """(n,) the error that `retract` would move computed by to reach true."""
-        ...
+__all__ = ["ForwardPass", "smooth"]
 
 
 class ForwardPass(NamedTuple):
     """A forward pass over k nodes.
 
     states, covariances: (k, w) packed and (k, n, n) after the update of each node, if it had one. prior_states,
-    prior_covariances: the same before it. transitions: (k, n, n) from the node before to each; the first is not used.
+    prior_covariances: the same before it, behind any inflation and clock jump. transitions: (k, n, n) from the node before to
+    each; the first is not used.
     """
 
     states: Floats
@@ -42,7 +32,7 @@ class ForwardPass(NamedTuple):
     transitions: Floats
 
 
-def smooth(forward: ForwardPass, model: ErrorState) -> tuple[Floats, Floats]:
+def smooth(forward: ForwardPass, model: ErrorModel) -> tuple[Floats, Floats]:
     """Smoothed packed states (k, w) and covariances (k, n, n)."""
     gains = _gains(forward)
     states, covariances = forward.states.copy(), forward.covariances.copy()

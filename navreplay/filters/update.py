@@ -13,7 +13,7 @@ from navreplay.solution import RowStatus
 from navreplay.strapdown import NavState
 from navreplay.timeline import Floats, Times
 
-__all__ = ["Aiding", "EpochGate", "Observed", "Updater", "Verdict"]
+__all__ = ["Aiding", "EpochGate", "Observed", "Updated", "Updater", "Verdict"]
 
 
 class Observed(NamedTuple):
@@ -22,6 +22,17 @@ class Observed(NamedTuple):
     measurement: Measurement | None
     state: NavState
     cov: Floats
+
+
+class Updated(NamedTuple):
+    """An epoch's outcome: state and cov (n, n), what they were before the measurement (clock jumps and inflation included), and
+    what became of it."""
+
+    state: NavState
+    cov: Floats
+    prior_state: NavState
+    prior_cov: Floats
+    status: RowStatus
 
 
 class Verdict(Protocol):
@@ -86,11 +97,11 @@ class Updater:
         self._leftover: Leftover | None = None
         self._zero = np.zeros(model.size)
 
-    def update(self, epoch: int, state: NavState, cov: Floats, dtheta: Floats, dt: float) -> tuple[NavState, Floats, RowStatus]:
-        """State and covariance after the epoch of that index; dtheta (3,) [rad] and dt [s] are those of the step before it."""
+    def update(self, epoch: int, state: NavState, cov: Floats, dtheta: Floats, dt: float) -> Updated:
+        """The epoch of that index, from state and cov (n, n); dtheta (3,) [rad] and dt [s] are those of the step before it."""
         measurement, state, cov = self._aiding.observe(epoch, state, cov, dtheta, dt)
         if measurement is None:
-            return state, cov, RowStatus.PREDICTED
+            return Updated(state, cov, state, cov, RowStatus.PREDICTED)
         t_ns = int(self._aiding.t_ns[epoch])
         rule, adapter = self._method.rule, self._method.adapter
         prior = Gaussian(self._zero, cov)
@@ -111,13 +122,14 @@ class Updater:
         verdict.record(self._recorder, t_ns, measurement.kinds, innovation, noise)
         if not len(verdict.passed):
             self._leave(t_ns, labels, measurement.residual)
-            return state, cov, RowStatus.REJECTED
+            return Updated(state, cov, state, cov, RowStatus.REJECTED)
         if len(verdict.passed) < len(noise):
             innovation = innovation.select(verdict.passed)
             noise = noise[verdict.passed[:, None], verdict.passed]
         posterior = condition(adapted, innovation, noise)
         self._leave(t_ns, labels, measurement.residual - measurement.jacobian @ posterior.mean)
-        return self._model.retract(state, posterior.mean), posterior.cov, RowStatus.UPDATED
+        moved = self._model.retract(state, posterior.mean)
+        return Updated(moved, posterior.cov, state, adapted.cov, RowStatus.UPDATED)
 
     def _leave(self, t_ns: int, labels: tuple[str, ...], residual: Floats) -> None:
         self._leftover = Leftover(t_ns, dict(zip(labels, residual.tolist(), strict=True)))
