@@ -1,5 +1,7 @@
 """Checks of a timeline before any filtering: each finding is a plain sentence with the likely cause, and what to set."""
 
+from typing import Literal
+
 import numpy as np
 
 from importers.findings import Finding
@@ -25,14 +27,16 @@ def preflight(timeline: Timeline) -> tuple[Finding, ...]:
     imu, fixes, reference = timeline.imu, timeline.fixes, timeline.reference
     seen = ", ".join(f"{use.name} ({use.type})" for use in timeline.provenance.channels) or "no channel at all"
     if imu is None:
+        # ranges alone suffice for a GNSS-only filter
+        level: Literal["warning", "error"] = "error" if timeline.ranges is None else "warning"
         hint = "Add the file that holds the IMU, or name its channel with input.imu.channel."
-        findings.append(Finding("error", "no-imu", f"There is no IMU in the log; it holds {seen}.", hint))
+        findings.append(Finding(level, "no-imu", f"There is no IMU in the log; it holds {seen}.", hint))
     else:
         findings += [*_check_gravity(imu, fixes), *_check_gyro(imu), *_check_rate(imu)]
-    if fixes is None:
+    if fixes is None and timeline.ranges is None:
         hint = "Add the file that holds the fixes, or name their channel with input.fix.channel."
         findings.append(Finding("error", "no-gnss", f"There are no GNSS fixes in the log; it holds {seen}.", hint))
-    else:
+    elif fixes is not None:
         findings += _check_covariance(fixes)
     if imu is not None and fixes is not None:
         apart = _check_overlap(imu, fixes)
