@@ -6,6 +6,7 @@ import numpy as np
 
 from importers.findings import Finding
 from importers.motion_findings import check_motion
+from importers.range_findings import check_ranges
 from navreplay.earth import gravity
 from navreplay.time_scales import utc_from_gps
 from navreplay.timeline import GnssFixSeries, ImuSeries, Timeline, Times, Trajectory
@@ -33,6 +34,8 @@ def preflight(timeline: Timeline) -> tuple[Finding, ...]:
         findings.append(Finding(level, "no-imu", f"There is no IMU in the log; it holds {seen}.", hint))
     else:
         findings += [*_check_gravity(imu, fixes), *_check_gyro(imu), *_check_rate(imu)]
+    if timeline.ranges is not None:
+        findings += check_ranges(timeline.ranges, timeline.provenance.channels)
     if fixes is None and timeline.ranges is None:
         hint = "Add the file that holds the fixes, or name their channel with input.fix.channel."
         findings.append(Finding("error", "no-gnss", f"There are no GNSS fixes in the log; it holds {seen}.", hint))

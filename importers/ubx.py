@@ -73,9 +73,11 @@ class UbxLog:
         payload = _gather(self._buffer, start + _SFRBX_HEAD_BYTES, 4 * _WORDS)
         words = payload.view("<u4").astype(np.int64)
         words[np.arange(_WORDS) >= ((length - _SFRBX_HEAD_BYTES) // 4)[:, None]] = 0
-        columns: dict[str, np.ndarray] = {"gnssId": head[:, 0], "svId": head[:, 1], "freqId": head[:, 3], "dwrd": words}
+        times = self._word_times(start)
+        columns: dict[str, np.ndarray] = {"t_gps_ns": times, "gnssId": head[:, 0], "svId": head[:, 1], "freqId": head[:, 3]}
+        columns["dwrd"] = words
         rejected = {"checksum wrong": self._wrong[_SFRBX]} if self._wrong[_SFRBX] else {}
-        return Table(self._word_times(start), columns, len(start) + self._wrong[_SFRBX], rejected)
+        return Table(times, columns, len(start) + self._wrong[_SFRBX], rejected)
 
     def _word_times(self, start: NDArray[np.int64]) -> NDArray[np.int64]:
         """Of the measurements before each message; 0 where there are none."""
