@@ -309,34 +309,51 @@ def _add_noise(p, density, span, bridge):
 
 @njit(cache=True)
 def _multiply_left(phi, decay, total, work):
-    """total <- F total in place, F = [phi; diag(decay)]."""
-    n = total.shape[0]
+    """total (n, c) <- F total in place, F = [phi; diag(decay)]; c at most n."""
+    n, c = total.shape
     for i in range(9):
-        for j in range(n):
+        for j in range(c):
             value = 0.0
             for k in range(n):
                 value += phi[i, k] * total[k, j]
             work[i, j] = value
-    total[:9] = work
+    total[:9] = work[:, :c]
     for i in range(9, n):
         total[i] *= decay[i - 9]
 
 
 @njit(cache=True)
 def propagate(
-    start, p_start, dt, dtheta, dvel, bridged, ends, density, tau, interval, states, covariances, transitions, noises
+    start,
+    p_start,
+    cross_start,
+    dt,
+    dtheta,
+    dvel,
+    bridged,
+    ends,
+    density,
+    tau,
+    interval,
+    states,
+    covariances,
+    crosses,
+    transitions,
+    noises,
 ):
     """Mechanisation and covariance over k nodes.
 
-    start (w), p_start (n, n): at the beginning. dt, dtheta, dvel, bridged: steps. ends (k): number of steps up to and with
-    each node, the first counted from 0; consecutive nodes share no step. density (n): white-noise densities. tau (n - 9):
-    correlation times of the sensor errors, inf for random walks. interval [s]: longest covariance step; noise enters half
-    before and half after the transition (trapezoidal rule). Filled: states (k, w), covariances (k, n, n) and, unless they
-    have no rows, transitions and noises (k, n, n) of the node's whole interval.
+    start (w), p_start (n, n): at the beginning; cross_start (n, c): covariance with c states that do not move. dt, dtheta,
+    dvel, bridged: steps. ends (k): number of steps up to and with each node, the first counted from 0; nodes share no
+    step. density (n): white-noise densities. tau (n - 9): correlation times of the sensor errors, inf for random walks.
+    interval [s]: longest covariance step; noise enters half before and half after the transition (trapezoidal rule). Filled:
+    states (k, w), covariances (k, n, n), crosses (k, n, c) and, unless they have no rows, transitions and noises (k, n, n) of
+    the node's whole interval.
     """
     n = p_start.shape[0]
     x = start.copy()
     p = p_start.copy()
+    cross = cross_start.copy()
     a = np.empty((9, n))
     phi = np.empty((9, n))
     work = np.empty((9, n))
@@ -394,6 +411,8 @@ def propagate(
             _add_noise(p, density, span / 2, bridge / 2)
             _sandwich(phi, decay, p, work)
             _add_noise(p, density, span / 2, bridge / 2)
+            if cross.shape[1] > 0:
+                _multiply_left(phi, decay, cross, work)
             if keep:
                 _multiply_left(phi, decay, total_phi, work)
                 _add_noise(total_q, density, span / 2, bridge / 2)
@@ -407,6 +426,7 @@ def propagate(
             c_dvel[:, :] = 0
         states[node] = x
         covariances[node] = p
+        crosses[node] = cross
         if keep:
             transitions[node] = total_phi
             noises[node] = total_q

@@ -117,6 +117,8 @@ def matrix_en(lat: ArrayLike, lon: ArrayLike) -> Floats:
     lat = np.asarray(lat, dtype=np.float64)
     lon = np.asarray(lon, dtype=np.float64)
     sl, cl, so, co = np.sin(lat), np.cos(lat), np.sin(lon), np.cos(lon)
+    if lat.ndim == 0 and lon.ndim == 0:  # of a single point, without the cost of stacking
+        return np.array([[-sl * co, -so, -cl * co], [-sl * so, co, -cl * so], [cl, 0.0, -sl]])
     rows = [[-sl * co, -so, -cl * co], [-sl * so, co, -cl * so], [cl, np.zeros_like(cl), -sl]]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navreplay import earth
+from navreplay.atmosphere import SPEED_OF_LIGHT
 from navreplay.error_models.ned import ATTITUDE, POSITION, VELOCITY, gyro_columns
 from navreplay.measurements import Measurement, cross_matrix
 from navreplay.range_epochs import RangeEpochs
@@ -69,7 +70,9 @@ def range_measurement(
     """
     group = epochs.group[rows]
     rated = np.flatnonzero(np.isfinite(epochs.range_rate[rows]))
-    towards_n = (epochs.sat_pos_e[rows] - antenna.pos_e) @ antenna.c_en
+    # the receiver stamps by its own clock: the signals came that much before the stamp
+    pos_e = antenna.pos_e - antenna.c_en @ antenna.vel_n * (clock[0] / SPEED_OF_LIGHT)
+    towards_n = (epochs.sat_pos_e[rows] - pos_e) @ antenna.c_en
     distance = np.sqrt((towards_n**2).sum(axis=1))
     sight = towards_n / distance[:, None]
     approach_n = epochs.sat_vel_e[rows][rated] @ antenna.c_en - antenna.vel_n

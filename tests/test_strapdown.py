@@ -96,11 +96,13 @@ def run_propagate(imu, state, p, interval, nodes, keep=True, tau=None, density=N
     n, k = len(p), len(nodes)
     tau = np.full(n - 9, np.inf) if tau is None else tau
     density = np.zeros(n) if density is None else density
-    out = np.empty((k, 28)), np.empty((k, n, n)), np.empty((k if keep else 0, n, n)), np.empty((k if keep else 0, n, n))
+    out = np.empty((k, 28)), np.empty((k, n, n)), np.empty((k, n, 0)), np.empty((k * keep, n, n)), np.empty((k * keep, n, n))
+    cross = np.empty((n, 0))
     _kernels.propagate(
-        state.pack(), p, steps.dt, steps.dtheta, steps.dvel, steps.bridged, np.array(nodes), density, tau, interval, *out
+        *(state.pack(), p, cross, steps.dt, steps.dtheta, steps.dvel, steps.bridged, np.array(nodes)),
+        *(density, tau, interval, *out),
     )
-    return out
+    return out[0], out[1], *out[3:]
 
 
 def disturbed(state: NavState, d: np.ndarray) -> NavState:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from navreplay.error_models.error_model import ErrorModel
+from navreplay.error_models.error_model import MotionModel
 from navreplay.error_models.ned import Propagated
 from navreplay.error_models.receiver_clock import ReceiverClock
 from navreplay.strapdown import NavState, Steps
@@ -21,7 +21,7 @@ __all__ = ["ClockedModel"]
 class ClockedModel:
     """The states of motion (n of them) and, behind them, those of the clock (c)."""
 
-    motion: ErrorModel
+    motion: MotionModel
     clock: ReceiverClock
 
     @property
@@ -53,22 +53,22 @@ class ClockedModel:
     ) -> Propagated:
         """From state and cov (n + c, n + c) before step `first` to the nodes behind ends (k,) steps, counted from the first."""
         n, k = self.motion.size, len(ends)
-        moved = self.motion.propagate(state, cov[:n, :n], steps, first, ends, interval, keep=True)
-        elapsed = np.concatenate([[0.0], np.cumsum(steps.dt[first : int(ends[-1])])])[ends - first]
-        dt = np.diff(elapsed, prepend=0.0)
-        phi, q = self.clock.transitions(dt), self.clock.noises(dt)
+        moved = self.motion.propagate(state, cov[:n, :n], steps, first, ends, interval, keep, cov[:n, n:])
+        # the clock's transitions act on the other side of the cross-covariance, and so may come last and all at once
+        elapsed = np.cumsum(steps.dt[first : int(ends[-1])])[ends - first - 1]
+        phi = self.clock.transitions(elapsed)
+        moved.states[:, -self.clock.size :] = phi @ state.clock
         covariances = np.empty((k, self.size, self.size))
-        cross, clock_cov, clock = cov[:n, n:], cov[n:, n:], state.clock
-        for i in range(k):
-            cross = moved.transitions[i] @ cross @ phi[i].T
-            clock_cov = phi[i] @ clock_cov @ phi[i].T + q[i]
-            clock = phi[i] @ clock
-            covariances[i, :n, n:], covariances[i, n:, :n], covariances[i, n:, n:] = cross, cross.T, clock_cov
-            moved.states[i, -len(clock) :] = clock
         covariances[:, :n, :n] = moved.covariances
-        if not keep:
-            return Propagated(moved.states, covariances, moved.transitions[:0], moved.noises[:0])
-        return Propagated(moved.states, covariances, _side_by_side(moved.transitions, phi), _side_by_side(moved.noises, q))
+        covariances[:, :n, n:] = moved.crosses @ np.swapaxes(phi, 1, 2)
+        covariances[:, n:, :n] = np.swapaxes(covariances[:, :n, n:], 1, 2)
+        covariances[:, n:, n:] = phi @ cov[n:, n:] @ np.swapaxes(phi, 1, 2) + self.clock.noises(elapsed)
+        transitions, noises = moved.transitions, moved.noises
+        if keep:
+            between = np.diff(elapsed, prepend=0.0)
+            transitions = _side_by_side(transitions, self.clock.transitions(between))
+            noises = _side_by_side(noises, self.clock.noises(between))
+        return Propagated(moved.states, covariances, covariances[:, :, :0], transitions, noises)
 
 
 def _side_by_side(motion: Floats, clock: Floats) -> Floats:

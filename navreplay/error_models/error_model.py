@@ -8,7 +8,7 @@ from navreplay.error_models.ned import Propagated
 from navreplay.strapdown import NavState, Steps
 from navreplay.timeline import Floats
 
-__all__ = ["ErrorModel"]
+__all__ = ["ErrorModel", "MotionModel"]
 
 
 class ErrorModel(Protocol):
@@ -41,4 +41,22 @@ class ErrorModel(Protocol):
         self, state: NavState, cov: Floats, steps: Steps, first: int, ends: np.ndarray, interval: float, keep: bool = False
     ) -> Propagated:
         """From state and cov (n, n) before step `first` to the nodes behind ends (k,) steps, counted from the first of all."""
+        ...
+
+
+class MotionModel(ErrorModel, Protocol):
+    """An error model that can carry others beside it."""
+
+    def propagate(
+        self,
+        state: NavState,
+        cov: Floats,
+        steps: Steps,
+        first: int,
+        ends: np.ndarray,
+        interval: float,
+        keep: bool = False,
+        cross: Floats | None = None,
+    ) -> Propagated:
+        """The same with cross (n, c), the covariance with other states, as if those did not move."""
         ...

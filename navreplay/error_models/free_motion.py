@@ -77,25 +77,32 @@ class FreeMotionModel:
         return np.concatenate(parts)
 
     def propagate(
-        self, state: NavState, cov: Floats, steps: Steps, first: int, ends: np.ndarray, interval: float, keep: bool = False
+        self,
+        state: NavState,
+        cov: Floats,
+        steps: Steps,
+        first: int,
+        ends: np.ndarray,
+        interval: float,
+        keep: bool = False,
+        cross: Floats | None = None,
     ) -> Propagated:
         """From state and cov (n, n) before step `first` to the nodes behind ends (k,) steps, counted from the first of all.
 
-        Only the times of the steps are used, and the transition is exact over any interval.
+        Only the times of the steps are used, and the transition is exact over any interval. cross (n, c): covariance with
+        other states, as if they did not move.
         """
-        k, n = len(ends), self.size
-        kept = k if keep else 0
-        width = len(state.pack())
-        out = Propagated(np.empty((k, width)), np.empty((k, n, n)), np.empty((kept, n, n)), np.empty((kept, n, n)))
+        cross = np.empty((self.size, 0)) if cross is None else cross
+        out = Propagated.allocate(len(ends), len(state.pack()), cross, keep)
         elapsed = np.concatenate([[0.0], np.cumsum(steps.dt[first : int(ends[-1])])])[ends - first]
         for i, dt in enumerate(np.diff(elapsed, prepend=0.0).tolist()):
             phi, q = self._transition(dt), self._noise(dt)
             way = state.vel_n * dt + state.acceleration * dt**2 / 2
             moved = replace(state, lla=earth.move_lla(state.lla, way), vel_n=state.vel_n + state.acceleration * dt)
             state = self._face_course(moved)
-            cov = phi @ cov @ phi.T + q
+            cov, cross = phi @ cov @ phi.T + q, phi @ cross
             self._doubt_attitude(state, cov)
-            out.states[i], out.covariances[i] = state.pack(), cov
+            out.states[i], out.covariances[i], out.crosses[i] = state.pack(), cov, cross
             if keep:
                 out.transitions[i], out.noises[i] = phi, q
         return out

@@ -34,13 +34,22 @@ _UNITS = tuple(unit for unit in ("m", "m/s", "rad", "rad/s", "m/s^2") for _ in r
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Propagated:
-    """States (k, w) and covariances (k, n, n) at k nodes; transitions and noises (k, n, n) from the node before to each, or
-    without rows where they were not asked for."""
+    """States (k, w), covariances (k, n, n) and crosses (k, n, c) at k nodes; transitions and noises (k, n, n) from the node
+    before to each, or without rows where they were not asked for."""
 
     states: Floats
     covariances: Floats
+    crosses: Floats
     transitions: Floats
     noises: Floats
+
+    @classmethod
+    def allocate(cls, k: int, width: int, cross: Floats, keep: bool) -> "Propagated":
+        """Room for k nodes, states of that width and covariances with others like cross (n, c)."""
+        n = len(cross)
+        kept = k if keep else 0
+        rows = np.empty((k, width)), np.empty((k, n, n)), np.empty((k, *cross.shape))
+        return cls(*rows, np.empty((kept, n, n)), np.empty((kept, n, n)))
 
 
 def gyro_columns(size: int) -> tuple[slice, ...]:
@@ -148,20 +157,29 @@ class NedErrorModel:
         return np.concatenate(motion + sensors)
 
     def propagate(
-        self, state: NavState, cov: Floats, steps: Steps, first: int, ends: np.ndarray, interval: float, keep: bool = False
+        self,
+        state: NavState,
+        cov: Floats,
+        steps: Steps,
+        first: int,
+        ends: np.ndarray,
+        interval: float,
+        keep: bool = False,
+        cross: Floats | None = None,
     ) -> Propagated:
         """From state and cov (n, n) before step `first` to the nodes behind ends (k,) steps, counted from the first of all.
 
-        interval [s]: longest step of the covariance. keep: return transitions and noises as well.
+        interval [s]: longest step of the covariance. keep: return transitions and noises as well. cross (n, c): covariance
+        with other states, as if they did not move.
         """
-        k, n = len(ends), self.size
-        kept = k if keep else 0
+        cross = np.empty((self.size, 0)) if cross is None else cross
         packed = state.pack()
-        out = Propagated(np.empty((k, len(packed))), np.empty((k, n, n)), np.empty((kept, n, n)), np.empty((kept, n, n)))
+        out = Propagated.allocate(len(ends), len(packed), cross, keep)
         part = slice(first, int(ends[-1]))
         _kernels.propagate(
             packed,
             cov,
+            cross,
             steps.dt[part],
             steps.dtheta[part],
             steps.dvel[part],
@@ -172,6 +190,7 @@ class NedErrorModel:
             interval,
             out.states,
             out.covariances,
+            out.crosses,
             out.transitions,
             out.noises,
         )

@@ -5,6 +5,7 @@ of frequency. The offsets share the clock and differ by slow inter-system biases
 """
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -38,16 +39,24 @@ class ReceiverClock:
 
     def transitions(self, dt: Floats) -> Floats:
         """(k, c, c) over dt (k,) [s]."""
-        phi = np.tile(np.eye(self.size), (len(dt), 1, 1))
-        phi[:, :-1, -1] = dt[:, None]
-        return phi
+        still, moving, *_ = _terms(self)
+        return np.asarray(still + dt[:, None, None] * moving)
 
     def noises(self, dt: Floats) -> Floats:
         """(k, c, c) covariances of what the noise adds over dt (k,) [s]."""
-        white, walk = self.options.clock_noise**2, self.options.clock_drift_walk**2
-        q = np.empty((len(dt), self.size, self.size))
-        q[:, :-1, :-1] = (white * dt + walk * dt**3 / 3)[:, None, None]
-        q[:, :-1, :-1] += self.options.system_offset_walk**2 * dt[:, None, None] * np.eye(len(self.groups))
-        q[:, :-1, -1] = q[:, -1, :-1] = (walk * dt**2 / 2)[:, None]
-        q[:, -1, -1] = walk * dt
-        return q
+        _, _, linear, square, cube = _terms(self)
+        t = dt[:, None, None]
+        return np.asarray(t * (linear + t * (square + t * cube)))
+
+
+@cache
+def _terms(clock: ReceiverClock) -> tuple[Floats, ...]:
+    """Coefficients (c, c) of the transition in 1, dt and of the noise in dt, dt^2, dt^3."""
+    options, c = clock.options, clock.size
+    moving, linear, square, cube = np.zeros((4, c, c))
+    moving[:-1, -1] = 1.0
+    linear[:-1, :-1] = options.clock_noise**2 + options.system_offset_walk**2 * np.eye(c - 1)
+    linear[-1, -1] = options.clock_drift_walk**2
+    square[:-1, -1] = square[-1, :-1] = options.clock_drift_walk**2 / 2
+    cube[:-1, :-1] = options.clock_drift_walk**2 / 3
+    return np.eye(c), moving, linear, square, cube
