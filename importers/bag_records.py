@@ -102,6 +102,7 @@ def walk_file(buffer: Buffer, landmarks: Offsets) -> Walk:
     from importers.record_scan import scan_bag
 
     def scan(part: Buffer, begin: int) -> tuple[np.ndarray, Offsets, Offsets, Offsets, int]:
+        """See `walk_records`; a record begins with the length of its header."""
         op, _, _, header, start, stop, end = scan_bag(part, begin)
         return op, header - 4, start, stop, end
 

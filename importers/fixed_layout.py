@@ -43,6 +43,7 @@ class _Fields:
         self.formats: list[np.dtype] = []
 
     def place(self, name: str, dtype: np.dtype, alignment: int = 1) -> int:
+        """Puts a field behind the last one and gives its offset."""
         self.at += -(self.at - self.origin) % alignment
         self.offsets[name] = self.at
         self.formats.append(dtype)
@@ -50,6 +51,7 @@ class _Fields:
         return self.offsets[name]
 
     def dtype(self) -> np.dtype:
+        """The fields collected so far."""
         offsets = list(self.offsets.values())
         return np.dtype({"names": list(self.offsets), "formats": self.formats, "offsets": offsets, "itemsize": self.at})
 

@@ -78,8 +78,7 @@ def inspect_logs(
         for log in everything
         for channel in log.channels()
     )
-    damage = [f"{log.path}: {note}" for log in everything for note in log.notes]
-    findings += [Finding("warning", "damaged", note, "") for note in damage]
+    findings += [Finding("warning", "damaged", f"{log.path}: {note}", "") for log in everything for note in log.notes]
     usable = [choice for choice in chosen if (id(choice.log), choice.channel.name) in tables]
     assumptions: tuple[str, ...] = ()
     try:
@@ -87,7 +86,7 @@ def inspect_logs(
     except LogError as error:
         findings.append(Finding("error", "unusable", f"{error}.", ""))
     else:
-        assumptions = tuple(note for note in timeline.provenance.assumptions if note not in damage)
+        assumptions = timeline.provenance.assumptions
         findings += [finding for finding in preflight(timeline) if finding.code not in _implied(open_choices)]
     files = tuple(describe_file(log) for log in everything)
     return Inspection(files, channels, tuple(findings), open_choices, assumptions)

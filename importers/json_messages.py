@@ -27,16 +27,22 @@ class JsonDecoder:
         """See `Decoder`."""
         kept, rows = [], []
         for place, (a, b) in enumerate(zip(start, stop, strict=True)):
-            try:
-                message = json.loads(buffer[a:b].tobytes())
-            except (ValueError, RecursionError):
-                continue  # counted by its absence from kept
-            if isinstance(message, dict):
+            message = _parse(buffer[a:b].tobytes())
+            if message is not None:  # the others are counted by their absence from kept
                 rows.append(_flatten(message, ""))
                 kept.append(place)
         paths = dict.fromkeys(path for row in rows for path in row)
         columns = {path: _column([row.get(path) for row in rows]) for path in paths}
         return Decoded(columns, np.array(kept, dtype=np.intp), reason="not a JSON object")
+
+
+def _parse(text: bytes) -> dict[str, Any] | None:
+    """The object that the text holds; None where it holds none."""
+    try:
+        value = json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+    return value if isinstance(value, dict) else None
 
 
 def _is_number(value: Any) -> bool:

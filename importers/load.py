@@ -66,7 +66,7 @@ def build_timeline(
         sources.setdefault(choice.role, []).append(Source(choice.log.path, choice.channel, table, choice.role))
     clock = Clock(leap_seconds(settings.leap_seconds), tuple(source.table for source in sources.get("time", [])))
     uses: list[ChannelUse] = [_time_use(source) for source in sources.get("time", [])]
-    notes: list[str] = [f"{log.path}: {note}" for log in logs for note in log.notes]
+    notes: list[str] = []
     imu = fixes = ranges = attitude = trajectory = None
     if "imu" in sources:
         imu, told, assumed = convert_imu(join_sources(sources["imu"], settings.imu, clock), settings.imu)
@@ -91,7 +91,8 @@ def build_timeline(
         trajectory = reference_from_fixes(fixes, settings.reference)
         notes.append("the fixes themselves, before any is withheld, serve as the reference: not an independent one")
     files = tuple(describe_file(log) for log in {log.path: log for log in logs}.values())
-    provenance = Provenance(files, _complete(logs, uses), tuple(dict.fromkeys(notes)))
+    damage = tuple(f"{log.path}: {note}" for log in logs for note in log.notes)
+    provenance = Provenance(files, _complete(logs, uses), tuple(dict.fromkeys(notes)), damage)
     return Timeline(
         imu=imu,
         fixes=fixes,

@@ -43,7 +43,9 @@ R = TypeVar("R", covariant=True)
 
 class _Parser(Protocol[R]):
     @staticmethod
-    def read(stream: ReadDataStream) -> R: ...
+    def read(stream: ReadDataStream) -> R:
+        """The record that the stream holds."""
+        ...
 
 
 def parse_record(kind: _Parser[R], content: Buffer) -> R | None:
@@ -122,6 +124,7 @@ def walk_file(buffer: Buffer, landmarks: Offsets) -> Walk:
     from importers.record_scan import scan_mcap
 
     def scan(part: Buffer, begin: int) -> tuple[np.ndarray, Offsets, Offsets, Offsets, int]:
+        """See `walk_records`."""
         opcode, start, stop, end = scan_mcap(part, begin)
         return opcode, start - RECORD_HEAD, start, stop, end
 

@@ -102,6 +102,7 @@ def _satellite_status(code: np.ndarray, cov: Floats) -> np.ndarray:
 
 def _twist(prefix: str) -> Callable[[Mapping[str, np.ndarray]], Rows]:
     def rows(columns: Mapping[str, np.ndarray]) -> Rows:
+        """Velocities and, where the message has them, their covariances."""
         cov = columns.get("twist.covariance")
         cov_vel = None if cov is None else cov.astype(np.float64).reshape(-1, 6, 6)[:, :3, :3]
         return Rows(vel=columns[prefix + "linear"].astype(np.float64), vel_frame="auto", cov_vel=cov_vel)
@@ -115,6 +116,7 @@ def _own_velocity(columns: Mapping[str, np.ndarray]) -> Rows:
 
 def _pose(prefix: str) -> Callable[[Mapping[str, np.ndarray]], Rows]:
     def rows(columns: Mapping[str, np.ndarray]) -> Rows:
+        """Local positions and attitudes."""
         q = scalar_first_from_last(columns[prefix + "orientation"])
         return Rows(local=columns[prefix + "position"].astype(np.float64), q=q, ros_attitude=True)
 

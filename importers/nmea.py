@@ -143,6 +143,7 @@ def _date_rows(path: str, lines: np.ndarray, seconds: Floats, rmc: pd.DataFrame,
 
 def _positions(gga: pd.DataFrame) -> Floats:
     def angle(column: str, letters: int, negative: str) -> Floats:
+        """Degrees and minutes, written together, in radians."""
         value = gga[column].to_numpy(dtype=np.float64)
         degrees = value // 100 + value % 100 / 60
         return np.asarray(np.radians(np.where(gga[letters].to_numpy() == negative, -degrees, degrees)))

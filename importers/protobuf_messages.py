@@ -4,7 +4,7 @@ import numpy as np
 from google.protobuf.descriptor import Descriptor, FieldDescriptor
 from google.protobuf.descriptor_pb2 import FileDescriptorProto, FileDescriptorSet
 from google.protobuf.descriptor_pool import DescriptorPool
-from google.protobuf.message import DecodeError
+from google.protobuf.message import DecodeError, Message
 from google.protobuf.message_factory import GetMessageClass
 
 from importers.message_blocks import Buffer, Decoded, Offsets
@@ -46,13 +46,18 @@ class ProtobufDecoder:
         """See `Decoder`."""
         kept, messages = [], []
         for place, (a, b) in enumerate(zip(start, stop, strict=True)):
-            try:
-                messages.append(self._class.FromString(buffer[a:b].tobytes()))
-            except DecodeError:
-                continue  # counted by its absence from kept
-            kept.append(place)
+            message = self._parse(buffer[a:b].tobytes())
+            if message is not None:  # the others are counted by their absence from kept
+                messages.append(message)
+                kept.append(place)
         columns = columns_of_messages(self._leaves, messages)
         return Decoded(columns, np.array(kept, dtype=np.intp), reason=f"not decodable as {self._name}")
+
+    def _parse(self, content: bytes) -> Message | None:
+        try:
+            return self._class.FromString(content)
+        except DecodeError:
+            return None
 
 
 def _find(name: str, descriptors: bytes) -> Descriptor:

@@ -78,16 +78,21 @@ class RosDecoder:
     def _decode_singly(
         self, buffer: Buffer, start: Offsets, stop: Offsets, places: NDArray[np.intp]
     ) -> tuple[NDArray[np.intp], Columns]:
-        store, name = self._type.store, self._type.name
-        deserialize = store.deserialize_cdr if self._encoding == "cdr" else store.deserialize_ros1
         kept, messages = [], []
         for place in places:
-            try:
-                messages.append(deserialize(buffer[start[place] : stop[place]].tobytes(), name))
-            except SerdeError:
-                continue  # counted by its absence from kept
-            kept.append(place)
+            message = self._deserialize(buffer[start[place] : stop[place]].tobytes())
+            if message is not None:  # the others are counted by their absence from kept
+                messages.append(message)
+                kept.append(place)
         return np.array(kept, dtype=np.intp), columns_of_messages(self._type.leaves, messages)
+
+    def _deserialize(self, content: bytes) -> object | None:
+        store = self._type.store
+        deserialize = store.deserialize_cdr if self._encoding == "cdr" else store.deserialize_ros1
+        try:
+            return deserialize(content, self._type.name)
+        except SerdeError:
+            return None
 
 
 def _in_order(pieces: list[tuple[NDArray[np.intp], Columns]]) -> tuple[Columns, NDArray[np.intp]]:

@@ -66,13 +66,14 @@ class Screening:
     def _sort(self, t_ns: Times, index: NDArray[np.intp], steps: Times) -> NDArray[np.intp]:
         worst, count = -int(steps.min()), int((steps < 0).sum())
         if worst <= _SMALL_DISORDER_NS:
-            self.notes.append(f"{self.name}: {count} stamps were out of order by at most {worst / 1e9:.3g} s and were sorted")
+            stamps = "1 stamp was" if count == 1 else f"{count} stamps were"
+            self.notes.append(f"{self.name}: {stamps} out of order by at most {worst / 1e9:.3g} s; the samples were sorted")
             return index[np.argsort(t_ns[index], kind="stable")]
         kept = longest_increasing(t_ns[index])
         self._reject_rows(np.delete(index, kept), NOT_INCREASING)
+        often = "once" if count == 1 else f"{count} times"
         self.notes.append(
-            f"{self.name}: time jumps back {count} times, by up to {worst / 1e9:.6g} s; the longest increasing run of stamps "
-            "was kept"
+            f"{self.name}: time jumps back {often}, by up to {worst / 1e9:.6g} s; the longest increasing run of stamps was kept"
         )
         return index[kept]
 

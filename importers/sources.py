@@ -72,7 +72,7 @@ def join_sources(
     parts = tuple(slice(int(end - len(times)), int(end)) for end, (times, _) in zip(ends, timed, strict=True))
     t_ns = np.concatenate([times for times, _ in timed])
     if len(t_ns) == 0:
-        raise LogError(f"{ordered[0].file}: channel {ordered[0].channel.name} holds no readable message")
+        raise _nothing_readable(ordered[0])
     return Joined(ordered[0].channel.name, t_ns, _concatenate(rows), ordered, parts, tuple(dict.fromkeys(notes)))
 
 
@@ -96,9 +96,19 @@ def _extract(source: Source) -> Rows:
     try:
         return kind.rows(source.table.columns)
     except KeyError as error:
+        if len(source.table.log_time_ns) == 0:
+            raise _nothing_readable(source) from error
         raise LogError(
             f"{source.file}: channel {source.channel.name} says it is {source.channel.type} but has no field {error.args[0]}"
         ) from error
+
+
+def _nothing_readable(source: Source) -> LogError:
+    lost = ", ".join(f"{count} {reason}" for reason, count in source.table.rejected.items())
+    of = f" of {source.table.read} ({lost})" if lost else ""
+    return LogError(
+        f"{source.file}: channel {source.channel.name} holds no readable message{of}; copy the file again, or leave it out"
+    )
 
 
 def _concatenate(rows: Sequence[Rows]) -> Rows:

@@ -293,11 +293,13 @@ class ChannelUse:
 
 @dataclass(frozen=True, slots=True)
 class Provenance:
-    """Where a timeline came from: files, channels, and in plain sentences what was assumed or converted on the way."""
+    """Where a timeline came from: files, channels, and in plain sentences what was assumed or converted on the way and what
+    damage the files have."""
 
     files: tuple[SourceFile, ...] = ()
     channels: tuple[ChannelUse, ...] = ()
     assumptions: tuple[str, ...] = ()
+    damage: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)

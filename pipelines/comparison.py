@@ -14,7 +14,7 @@ from pipelines.svg import Layer, Panel, draw_map, draw_time_panels, map_height
 __all__ = ["build_comparison", "comparison_figures", "comparison_plots", "comparison_tables"]
 
 _SCHEMA = "navreplay comparison 1"
-_COMMON = ("versions", "channels", "files", "assumptions", "findings", "configuration")
+_COMMON = ("versions", "channels", "files", "assumptions", "damage", "findings", "configuration")
 _OWN = ("drive", "errors", "nees", "within_3_sigma", "nis", "innovations", "outages", "events", "timing_s")
 _STRETCHES = {"all": "whole drive", "outside": "outside outages", "inside": "inside outages"}
 _STYLES = tuple(f"c{number}" for number in range(1, 7))

@@ -20,6 +20,7 @@ def show_progress(quiet: bool) -> Iterator[Progress | None]:
     with tqdm(total=1.0, bar_format=bar_format, delay=2, miniters=0, disable=None, leave=False) as bar:
 
         def tell(stage: str, fraction: float) -> None:
+            """See `Progress`."""
             bar.set_description_str(stage, refresh=False)
             bar.update(fraction - bar.n)
 

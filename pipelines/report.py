@@ -177,6 +177,7 @@ def _describe_provenance(provenance: Provenance) -> dict[str, Any]:
         "channels": [asdict(channel) | {"rejected": dict(channel.rejected)} for channel in provenance.channels],
         "files": [asdict(file) for file in provenance.files],
         "assumptions": list(provenance.assumptions),
+        "damage": list(provenance.damage),
     }
 
 

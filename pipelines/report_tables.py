@@ -221,6 +221,7 @@ def _text_tables(report: Report) -> list[Table]:
     more = len(report["events"]) - len(events)
     tables = [
         Table("Findings", ("level", "finding", "what to do"), findings),
+        Table("Damage", ("found in the files",), tuple((text,) for text in report["damage"])),
         Table("Assumptions", ("assumed or converted on the way",), tuple((text,) for text in report["assumptions"])),
         Table("Events", ("UTC", "level", "event"), events, f"{more} more are in report.json." if more else ""),
         Table("Files", ("file", "format", "bytes", "SHA-256"), files),

@@ -65,10 +65,8 @@ def summarise_run(result: RunResult) -> list[str]:
 
 
 def _describe_losses(provenance: Provenance) -> list[str]:
-    """Damage found in files (notes that begin with a file's path) and messages that were rejected."""
-    paths = tuple(f"{file.path}: " for file in provenance.files)
-    damage = [f"damaged: {note}" for note in provenance.assumptions if note.startswith(paths)]
-    return damage + [
+    """Damage found in files and messages that were rejected."""
+    return [f"damaged: {note}" for note in provenance.damage] + [
         f"rejected: {channel.name}: {count} of {channel.read} messages ({reason})"
         for channel in provenance.channels
         for reason, count in channel.rejected.items()
@@ -88,7 +86,7 @@ def _describe_errors(evaluation: Evaluation) -> list[str]:
     ends = summarise_outages(evaluation.outages)["end_horizontal"]
     if ends.count:
         counted = count_outages(evaluation.outages)
-        kind = "simulated outages" if counted[0].outage.cause == "simulated" else "outages"
+        kind = ("simulated " if counted[0].outage.cause == "simulated" else "") + ("outage" if ends.count == 1 else "outages")
         others = len(evaluation.outages) - len(counted)
         apart = f"; {others} of other causes in the report" if others else ""
         lines.append(

@@ -57,6 +57,7 @@ def _trace(px: Floats, py: Floats) -> str:
 
 def _draw_layer(layer: Layer, across: Scale, up: Scale, x_ordered: bool = True) -> str:
     def down(values: Floats) -> Floats:
+        """Pixels from the top, kept near the panel: browsers stumble over huge coordinates."""
         return np.clip(up.pixels - up.place(values), -2e3, 2e4)
 
     title = f' data-name="{escape(layer.name)}"'

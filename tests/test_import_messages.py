@@ -122,7 +122,8 @@ def test_small_disorder_is_sorted_and_told(tmp_path):
     timeline = load_tables(tmp_path, {"/imu": (IMU, imu_table(**{"header.stamp": t}))})
     assert len(timeline.imu) == 200
     assert any(
-        "1 stamps were out of order by at most 0.01 s and were sorted" in note for note in timeline.provenance.assumptions
+        "1 stamp was out of order by at most 0.01 s; the samples were sorted" in note
+        for note in timeline.provenance.assumptions
     )
 
 
