@@ -75,7 +75,7 @@ def scalar_innovations(count: int, noise_std: float, seed: int) -> list[Innovati
     """Innovations of a converged filter: spread 1, told noise 1, actual noise of noise_std, three components."""
     rng = np.random.default_rng(seed)
     residual = rng.normal(size=(count, 3)) * np.sqrt(1 + noise_std**2)
-    return [Innovation(r, np.ones((2, 3)), np.eye(3), np.eye(3), ("a", "b", "c")) for r in residual]
+    return [Innovation(r, np.eye(2, 3) / 2, np.eye(3), np.eye(3), ("a", "b", "c")) for r in residual]
 
 
 PRIOR = Gaussian(np.zeros(2), np.eye(2))

@@ -2,6 +2,7 @@
 
 Source: Kalman, J. Basic Engineering 82 (1960) 35. Assumes that the told R is the true one. Fails, by over- or
 underconfidence, as soon as it is not.
+When well specified: mean NEES per state 0.9 to 1.1, NIS per component 0.95 to 1.05.
 """
 
 from dataclasses import dataclass

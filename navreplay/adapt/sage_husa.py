@@ -8,6 +8,7 @@ nu nu' - H P H' of one epoch may be negative.
 Assumes: model and Q are right, noise changes slowly against 1 / (1 - b) epochs.
 Fails: with Q wrong or P far from converged; the printed start (d_0 = 1) believes the first epoch alone, so the told R here
 counts as `told_epochs` epochs.
+When well specified: mean NEES per state 1 to 1.3, NIS per component 0.9 to 1.05.
 """
 
 from collections.abc import Mapping

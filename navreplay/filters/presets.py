@@ -6,14 +6,22 @@ from difflib import get_close_matches
 from typing import Any
 
 from navreplay.adapt.adapter import NoiseAdapter
+from navreplay.adapt.correntropy import Correntropy
 from navreplay.adapt.eiakf import Eiakf
+from navreplay.adapt.em import Em, PrintedEm
 from navreplay.adapt.ermakf import Ermakf
 from navreplay.adapt.ermakf_derived import ErmakfDerived
 from navreplay.adapt.fixed import Fixed
+from navreplay.adapt.h_infinity import HInfinity
 from navreplay.adapt.huber import Huber
 from navreplay.adapt.iae import Iae
+from navreplay.adapt.iae_q import IaeQ
+from navreplay.adapt.maximum_likelihood import GeneticLikelihood, MaximumLikelihood
 from navreplay.adapt.sage_husa import SageHusa
 from navreplay.adapt.srmakf import Srmakf
+from navreplay.adapt.strong_tracking import StrongTracking
+from navreplay.adapt.student_t import StudentT
+from navreplay.adapt.variational_bayes import VariationalBayes
 from navreplay.filters.moments import Linearised
 from navreplay.timeline import LogError
 
@@ -48,8 +56,18 @@ PRESETS: dict[str, Preset] = {
     for preset in (
         Preset("fixed", "extended Kalman filter with the noise it is told", Fixed),
         Preset("iae", "R from the innovations of a window (Mohamed and Schwarz 1999)", Iae),
+        Preset("iae-q", "R and Q from corrections and residuals of a window (Mohamed and Schwarz 1999)", IaeQ),
         Preset("sage-husa", "R as a fading mean over the innovations (Sage and Husa 1969)", SageHusa),
         Preset("huber", "outlying measurements weighted down (Huber 1964, Karlgaard and Schaub 2007)", Huber),
+        Preset("student-t", "measurement noise with Student's t distribution (Piche et al. 2012)", StudentT),
+        Preset("correntropy", "outlying measurements and priors weighted by a Gaussian kernel (Chen et al. 2017)", Correntropy),
+        Preset("vb", "R by variational Bayes (Särkkä and Nummenmaa 2009)", VariationalBayes),
+        Preset("ml", "R of greatest likelihood over a window, by SQP (Gao et al. 2021)", MaximumLikelihood),
+        Preset("ml-ga", "the same by differential evolution, slow (Gao et al. 2021)", GeneticLikelihood),
+        Preset("em-kf", "P and R by expectation maximisation at each epoch (Lai et al. 2022)", Em),
+        Preset("em-kf-printed", "the same with equation (30) as printed", PrintedEm),
+        Preset("strong-tracking", "prior inflated by a fading factor (Zhou and Frank 1996, Lou et al. 2019)", StrongTracking),
+        Preset("h-infinity", "prior widened against the worst case (Simon 2006, Zhang et al. 2015)", HInfinity),
         Preset("eiakf", "R from innovations, correlated ones taken for AR(1) (Ghaleb et al. 2017)", Eiakf),
         Preset("srmakf", "R from differences of consecutive epochs against the INS (Ge et al. 2020)", Srmakf),
         Preset("ermakf", "srmakf with random weights, and Burg's method where noise is doubtful (Ge et al. 2020)", Ermakf),
