@@ -19,6 +19,8 @@ _END_TOLERANCE_S = 1.5
 _TOLERANCE_NS = 1_000_000
 """Epochs this close are one: the ends of simulated windows are typed by hand."""
 _UNKNOWN = (float("nan"),) * 4
+_POSITIONING = ("position", "range")
+"""Kinds of measurements that bound the position; a single range already does so, along its line of sight."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +38,7 @@ class OutageErrors:
 
 
 def _position_times(solution: Solution, used_only: bool = True) -> Times:
-    positions = [series for series in solution.innovations if series.kind == "position"]
+    positions = [series for series in solution.innovations if series.kind in _POSITIONING]
     times = [series.t_ns[series.used] if used_only else series.t_ns for series in positions]
     return np.unique(np.concatenate([np.empty(0, dtype=np.int64), *times]))
 

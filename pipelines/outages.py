@@ -1,15 +1,20 @@
-"""Fixes withheld from a filter on purpose: thinning to a lower rate and simulated outages."""
+"""Fixes and ranges withheld from a filter on purpose: thinning to a lower rate and simulated outages."""
+
+from collections.abc import Iterator
+from dataclasses import fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from navreplay.time_scales import gps_from_week_tow, week_tow_from_gps
-from navreplay.timeline import GnssFixSeries, LogError, Times
+from navreplay.timeline import GnssFixSeries, LogError, RangeSeries, Times
 from pipelines.sections import OutageSection
 
-__all__ = ["outage_windows", "withhold_fixes"]
+__all__ = ["outage_windows", "withhold_fixes", "withhold_ranges"]
 
 _TOLERANCE_NS = 1_000_000
+_RANGE_WIDE = ("ionosphere_removed", "troposphere_removed", "klobuchar")
+_RANGE_COLUMNS = tuple(field.name for field in fields(RangeSeries) if field.name not in _RANGE_WIDE)
 
 
 def outage_windows(section: OutageSection, t_ns: Times) -> tuple[tuple[int, int], ...]:
@@ -24,22 +29,51 @@ def withhold_fixes(fixes: GnssFixSeries, section: OutageSection) -> GnssFixSerie
 
     Raises LogError when none would be left, or when a window meets no fix at all (a wrong week or time of week).
     """
-    kept = np.ones(len(fixes), dtype=np.bool_)
-    if section.fix_interval_s is not None:
-        kept &= _first_of_each_interval(fixes.t_ns, section.fix_interval_s)
-    for start, end in outage_windows(section, fixes.t_ns):
-        inside = (fixes.t_ns > start + _TOLERANCE_NS) & (fixes.t_ns <= end + _TOLERANCE_NS)
-        if not inside.any():
-            raise LogError(
-                f"outages: no fix lies in the window {_describe_window(start, end)}, but the fixes span "
-                f"{_describe_window(int(fixes.t_ns[0]), int(fixes.t_ns[-1]))}; check outages.windows_gps_tow and outages.week"
-            )
+    kept = _thin(fixes.t_ns, section)
+    for inside in _inside_windows(fixes.t_ns, section, "fix", "fixes"):
         kept &= ~inside
     if not kept.any():
         raise LogError("outages: the windows withhold every fix of the log; nothing is left to navigate with")
     return GnssFixSeries(
         fixes.t_ns[kept], fixes.lla[kept], fixes.vel_n[kept], fixes.cov_pos[kept], fixes.cov_vel[kept], fixes.status[kept]
     )
+
+
+def withhold_ranges(ranges: RangeSeries, section: OutageSection) -> RangeSeries:
+    """The same for epochs of ranges; in a window the satellites seen most in it stay, as many as the section keeps.
+
+    Raises LogError when none would be left, or when a window meets no epoch at all.
+    """
+    kept = _thin(ranges.t_ns, section)
+    for inside in _inside_windows(ranges.t_ns, section, "range", "ranges"):
+        names, counts = np.unique(ranges.sat[inside], return_counts=True)
+        staying = names[np.argsort(-counts, kind="stable")[: section.satellites_kept]]
+        kept &= ~inside | np.isin(ranges.sat, staying)
+    if not kept.any():
+        raise LogError("outages: the windows withhold every range of the log; nothing is left to navigate with")
+    if kept.all():
+        return ranges
+    return replace(ranges, **{name: getattr(ranges, name)[kept] for name in _RANGE_COLUMNS})
+
+
+def _thin(t_ns: Times, section: OutageSection) -> NDArray[np.bool_]:
+    """(n,) what one epoch per interval leaves."""
+    if section.fix_interval_s is None:
+        return np.ones(len(t_ns), dtype=np.bool_)
+    epochs, epoch = np.unique(t_ns, return_inverse=True)
+    return _first_of_each_interval(epochs, section.fix_interval_s)[epoch]
+
+
+def _inside_windows(t_ns: Times, section: OutageSection, one: str, many: str) -> Iterator[NDArray[np.bool_]]:
+    """(n,) per window, which of the times lie in it. Raises LogError when a window holds none."""
+    for start, end in outage_windows(section, t_ns):
+        inside = (t_ns > start + _TOLERANCE_NS) & (t_ns <= end + _TOLERANCE_NS)
+        if not inside.any():
+            raise LogError(
+                f"outages: no {one} lies in the window {_describe_window(start, end)}, but the {many} span "
+                f"{_describe_window(int(t_ns[0]), int(t_ns[-1]))}; check outages.windows_gps_tow and outages.week"
+            )
+        yield inside
 
 
 def _first_of_each_interval(t_ns: Times, interval_s: float) -> NDArray[np.bool_]:

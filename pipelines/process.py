@@ -15,8 +15,8 @@ from navreplay.filters.presets import build_method
 from navreplay.filters.run import run_filter
 from navreplay.metrics import evaluate, find_outages
 from navreplay.solution import Solution
-from navreplay.timeline import LogError, Timeline
-from pipelines.outages import outage_windows, withhold_fixes
+from navreplay.timeline import Floats, GnssFixSeries, LogError, RangeSeries, Timeline
+from pipelines.outages import outage_windows, withhold_fixes, withhold_ranges
 from pipelines.output_point import move_to_point
 from pipelines.result import RunResult
 from pipelines.spec import Config, filter_options
@@ -68,18 +68,30 @@ def filter_drive(drive: Drive, config: Config, progress: Progress | None = None)
         solution = run_filter(used, method, filter_options(config), tell)
     with _stage("evaluating", timing, progress):
         solution = replace(solution, outages=find_outages(solution, _simulated_windows(timeline, config)))
-        evaluation = None if timeline.reference is None else evaluate(solution, timeline.reference, timeline.reference_lever_b)
+        evaluation = None if timeline.reference is None else evaluate(solution, timeline.reference, _reference_lever(timeline))
     return RunResult(config, timeline, used, _at_output_point(solution, used, config), evaluation, drive.findings, timing)
 
 
+def _aiding(timeline: Timeline, config: Config) -> GnssFixSeries | RangeSeries | None:
+    """What aids the filter."""
+    return timeline.fixes if timeline.ranges is None or config.filter.use == "fixes" else timeline.ranges
+
+
 def _withhold(timeline: Timeline, config: Config) -> Timeline:
-    if timeline.fixes is None:
-        return timeline
-    return replace(timeline, fixes=withhold_fixes(timeline.fixes, config.outages))
+    aiding = _aiding(timeline, config)
+    if isinstance(aiding, RangeSeries):
+        return replace(timeline, ranges=withhold_ranges(aiding, config.outages))
+    return timeline if aiding is None else replace(timeline, fixes=withhold_fixes(aiding, config.outages))
 
 
 def _simulated_windows(timeline: Timeline, config: Config) -> tuple[tuple[int, int], ...]:
-    return () if timeline.fixes is None else outage_windows(config.outages, timeline.fixes.t_ns)
+    aiding = _aiding(timeline, config)
+    return () if aiding is None else outage_windows(config.outages, aiding.t_ns)
+
+
+def _reference_lever(timeline: Timeline) -> Floats:
+    """From the point that is solved for, which without IMU is the antenna."""
+    return timeline.reference_lever_b if timeline.imu is not None else timeline.reference_lever_b - timeline.fix_lever_b
 
 
 def _at_output_point(solution: Solution, timeline: Timeline, config: Config) -> Solution:

@@ -205,31 +205,37 @@ def _plot_innovations(series: InnovationSeries, solution: Solution, shades: Sequ
     panels = []
     for i, label in enumerate(series.labels):
         spread = 3 * series.std[:, i]
+        # of many satellites at a time no band can be drawn
+        band = [] if series.sources else [Layer("band", t, -spread, "c1", "3 sigma", spread)]
         layers = [
-            Layer("band", t, -spread, "c1", "3 sigma", spread),
+            *band,
             Layer("dots", t[used], series.residual[used, i], "c1", "used"),
             Layer("crosses", t[refused], series.residual[refused, i], "bad", "rejected"),
         ]
         panels.append(Panel(f"{label} [{series.unit}]", tuple(layers), bend_of(series.residual, series.std)))
-    legend = (("dots c1", "used"), ("crosses bad", "rejected"), ("band c1", "3 sigma"))
-    note = "Measured minus predicted, with three standard deviations of their spread."
+    legend: Legend = (("dots c1", "used"), ("crosses bad", "rejected"))
+    note = "Measured minus predicted, of all satellites."
+    if not series.sources:
+        legend = (*legend, ("band c1", "3 sigma"))
+        note = "Measured minus predicted, with three standard deviations of their spread."
     return _time_plot(f"Innovations: {series.kind}", note, legend, panels, solution, shades)
 
 
 def _plot_noise(series: InnovationSeries, solution: Solution, shades: Sequence[tuple[float, float]]) -> Plot:
     t = _elapsed(series.t_ns, solution)
+    kind = "dots" if series.sources else "line"
     panels = [
         Panel(
             f"{label} [{series.unit}]",
             (
-                Layer("line", t, series.nominal_std[:, i], "reference", "told"),
-                Layer("line", t, series.noise_std[:, i], "c2", "used"),
+                Layer(kind, t, series.nominal_std[:, i], "reference", "told"),
+                Layer(kind, t, series.noise_std[:, i], "c2", "used"),
             ),
             bend_of(series.noise_std, series.nominal_std),
         )
         for i, label in enumerate(series.labels)
     ]
-    legend = (("line c2", "used by the filter"), ("line reference", "told by the receiver or the configuration"))
+    legend = ((f"{kind} c2", "used by the filter"), (f"{kind} reference", "told by the receiver or the configuration"))
     note = "Standard deviation of the measurement noise."
     return _time_plot(f"Noise: {series.kind}", note, legend, panels, solution, shades)
 

@@ -51,13 +51,11 @@ def _send_line(
     recording.send_columns(path, indexes=times, columns=rr.Scalars.columns(scalars=values))
 
 
-def _send_dots(recording: rr.RecordingStream, path: str, times: list[rr.TimeColumn], values: Floats, *, used: bool) -> None:
-    style = (
-        rr.SeriesPoints(colors=_BLUE, names="used", markers="circle", marker_sizes=2.5)
-        if used
-        else rr.SeriesPoints(colors=_RED, names="rejected", markers="cross", marker_sizes=2.5)
-    )
-    recording.log(path, style, static=True)
+def _send_dots(
+    recording: rr.RecordingStream, path: str, times: list[rr.TimeColumn], values: Floats, name: str, color: Color
+) -> None:
+    marker = "cross" if name == "rejected" else "circle"
+    recording.log(path, rr.SeriesPoints(colors=color, names=name, markers=marker, marker_sizes=2.5), static=True)
     recording.send_columns(path, indexes=times, columns=rr.Scalars.columns(scalars=values))
 
 
@@ -85,15 +83,17 @@ def send_innovations(recording: rr.RecordingStream, solution: Solution) -> None:
         times = time_columns(series.t_ns, solution)
         for i, label in enumerate(series.labels):
             path = f"/innovations/{series.kind}/{label}"
-            _send_line(recording, f"{path}/upper", times, 3 * series.std[:, i], "+3 sigma", _PALE)
-            _send_line(recording, f"{path}/lower", times, -3 * series.std[:, i], "-3 sigma", _PALE)
-            for name, rows in (("used", series.used), ("rejected", ~series.used)):
+            if not series.sources:  # of many satellites at a time no line can be drawn
+                _send_line(recording, f"{path}/upper", times, 3 * series.std[:, i], "+3 sigma", _PALE)
+                _send_line(recording, f"{path}/lower", times, -3 * series.std[:, i], "-3 sigma", _PALE)
+            for name, rows, color in (("used", series.used, _BLUE), ("rejected", ~series.used, _RED)):
                 if rows.any():
                     shown = time_columns(series.t_ns[rows], solution)
-                    _send_dots(recording, f"{path}/{name}", shown, series.residual[rows, i], used=name == "used")
+                    _send_dots(recording, f"{path}/{name}", shown, series.residual[rows, i], name, color)
             noise = f"/noise/{series.kind}/{label}"
-            _send_line(recording, f"{noise}/told", times, series.nominal_std[:, i], "told", _GREY)
-            _send_line(recording, f"{noise}/used", times, series.noise_std[:, i], "used", _ORANGE)
+            send = _send_dots if series.sources else _send_line
+            send(recording, f"{noise}/told", times, series.nominal_std[:, i], "told", _GREY)
+            send(recording, f"{noise}/used", times, series.noise_std[:, i], "used", _ORANGE)
 
 
 def send_biases(recording: rr.RecordingStream, solution: Solution) -> None:

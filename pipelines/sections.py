@@ -19,9 +19,11 @@ __all__ = [
     "GateSection",
     "GnssSection",
     "ImuSection",
+    "NotNegative",
     "OutageSection",
     "OutputSection",
     "PositionStdSection",
+    "Positive",
     "Section",
 ]
 
@@ -68,6 +70,10 @@ class ImuSection(Section):
     accel_scale_std_ppm: NotNegative | None = Field(
         None, description="uncertainty of the accelerometer scale factors [ppm]; above 0 they are estimated"
     )
+    gyro_markov_std_dps: NotNegative | None = Field(
+        None, description="Gauss-Markov error beside the gyro bias [deg/s]; above 0 it is estimated"
+    )
+    gyro_markov_tau_s: Positive | None = Field(None, description="its time constant [s]")
 
     def noise(self) -> ImuNoise:
         """The noise model in SI units."""
@@ -82,6 +88,8 @@ class ImuSection(Section):
             "accel_bias_tau": (self.accel_bias_tau_s, 1.0),
             "gyro_scale_std": (self.gyro_scale_std_ppm, _PPM),
             "accel_scale_std": (self.accel_scale_std_ppm, _PPM),
+            "gyro_markov_std": (self.gyro_markov_std_dps, _DEG),
+            "gyro_markov_tau": (self.gyro_markov_tau_s, 1.0),
         }
         return replace(GRADES[self.grade], **{name: value * unit for name, (value, unit) in given.items() if value is not None})
 
@@ -154,6 +162,9 @@ class FilterSection(Section):
     """The method (``navreplay filters`` lists them) and how it runs."""
 
     name: str = Field("fixed", description="name of the method")
+    use: Literal["auto", "fixes", "ranges"] = Field(
+        "auto", description="what aids the filter: fixes or ranges; auto: ranges where the log has them"
+    )
     parameters: Mapping[str, object] = Field(default_factory=dict, description="parameters of the method, by name")
     covariance_interval_s: Positive = Field(0.05, description="longest step of the covariance propagation [s]")
     use_velocity: bool = Field(True, description="use GNSS velocity where the log has it")
@@ -200,7 +211,7 @@ class OutputSection(Section):
 
 
 class OutageSection(Section):
-    """Fixes kept from the filter, to see how it does without them."""
+    """Fixes, or ranges where those are used, kept from the filter, to see how it does without them."""
 
     fix_interval_s: Positive | None = Field(None, description="keep one fix per interval, counted from the first fix [s]")
     windows_gps_tow: tuple[tuple[float, float], ...] = Field(
@@ -208,6 +219,9 @@ class OutageSection(Section):
     )
     week: Annotated[int, Field(ge=0)] | None = Field(
         None, description="full GPS week of the windows; without it the week of the first fix"
+    )
+    satellites_kept: Annotated[int, Field(ge=0)] = Field(
+        0, description="satellites whose ranges stay in the windows, those seen most in each"
     )
     file: str | None = Field(None, description="JSON file with the keys week and windows, read in place of windows_gps_tow")
 

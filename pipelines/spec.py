@@ -18,6 +18,7 @@ from pydantic_core import ErrorDetails
 from importers.settings import InputSettings
 from navreplay.options import FilterOptions
 from navreplay.timeline import LogError
+from pipelines.range_sections import MotionSection, RangeSection
 from pipelines.sections import (
     AlignmentSection,
     FilterSection,
@@ -45,6 +46,8 @@ class Config(Section):
     gaps: GapSection = GapSection()
     filter: FilterSection = FilterSection()
     gnss: GnssSection = GnssSection()
+    range: RangeSection = RangeSection()
+    motion: MotionSection = MotionSection()
     output: OutputSection = OutputSection()
     outages: OutageSection = OutageSection()
 
@@ -65,6 +68,9 @@ def filter_options(config: Config) -> FilterOptions:
         velocity_std_floor=config.gnss.velocity_std_floor_mps,
         default_position_std=config.gnss.default_position_std_m.by_status(),
         default_velocity_std=config.gnss.default_velocity_std_mps,
+        use=config.filter.use,
+        ranges=config.range.options(),
+        motion=config.motion.options(),
     )
 
 

@@ -31,6 +31,8 @@ _EXAMPLES = {
     "accel_bias_tau_s": 1000.0,
     "gyro_scale_std_ppm": 1000.0,
     "accel_scale_std_ppm": 1000.0,
+    "gyro_markov_std_dps": 1e-4,
+    "gyro_markov_tau_s": 300.0,
     "given_deg": [0.0, 0.0, 90.0],
     "output_point_m": [1.2, 0.0, 0.8],
     "fix_interval_s": 1.0,

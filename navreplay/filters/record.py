@@ -92,7 +92,7 @@ class Recorder:
         reasons = tuple(chain.from_iterable(epoch.reasons for epoch in epochs))
         return InnovationSeries(
             kind=kind,
-            labels=(kind.replace("_", " "),),
+            labels=(kind,),
             unit=_UNITS[kind],
             t_ns=np.repeat(np.array(self.times[kind], dtype=np.int64), counts),
             residual=residual[:, None],
