@@ -98,7 +98,10 @@ def _find_column(text: TextTable, column: Column, place: str) -> int:
         if column not in text.names:
             there = ", ".join(text.names) or f"{width} columns without names"
             raise LogError(f"{place} names the column '{column}', but the file has {there}")
-        return text.names.index(column)
+        place_in_line = text.names.index(column)
+        if place_in_line >= width and not text.frame.empty:
+            raise LogError(f"{place} names the column '{column}', but most lines of the file have only {width} fields")
+        return place_in_line
     if column > width and not text.frame.empty:
         raise LogError(f"{place} names column {column}, but the file has {width} columns")
     return column - 1

@@ -179,7 +179,7 @@ def _count(screening: Screening) -> str:
 def _cause(screening: Screening, ephemerides: Ephemerides) -> str:
     counts = screening.rejected(slice(None))
     worst = max(counts, key=lambda reason: counts[reason], default="")
-    if worst == FAULTS[1] and not ephemerides:
+    if FAULTS[1] in counts and not ephemerides:
         return "add the navigation file (RINEX navigation or SP3) to the logs, or name it with input.range.navigation"
     return {
         FAULTS[1]: "is the navigation file of the same day and the same systems?",

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from importers.ephemeris import GLONASS, KEPLER
 from importers.log import Table
-from importers.range_rows import satellite_names
 from importers.rinex_text import Lines, RinexText, exponent_numbers, plain_numbers, read_rinex
 from navreplay.time_scales import GPS_EPOCH_UNIX_S, WEEK_S, LeapSeconds, gps_from_utc
 from navreplay.timeline import Floats, LogError, Times
@@ -17,6 +16,7 @@ __all__ = ["is_rinex_navigation", "read_rinex_navigation"]
 
 _S = 1_000_000_000
 _BDT_BEHIND_GPS_S = 14
+_LARGEST_FLAGS = 4096
 _MESSAGES = ("LNAV", "INAV", "FNAV", "D1", "D2", "FDMA")
 _LINES = {"G": 8, "E": 8, "C": 8, "J": 8, "R": 4}
 _KEPLER_FIELDS: dict[str, tuple[int, int]] = {
@@ -39,7 +39,7 @@ def read_rinex_navigation(path: str, leap: LeapSeconds) -> Table:
     text = read_rinex(path, "N")
     start, count, message = _find_records(text)
     system = text.lines.field(start, 0, 1)[:, 0]
-    names = satellite_names(text.lines.field(start, 0, 3).copy().view("S3")[:, 0].astype("U3") if len(start) else np.empty(0))
+    names = text.lines.satellites(start)
     needed = np.array([_LINES.get(chr(code), 0) for code in system], dtype=np.int64)
     other = (names == "") | (needed == 0) | ~np.isin(message, ["", *_MESSAGES])
     cut = ~other & (count < needed)
@@ -51,7 +51,7 @@ def read_rinex_navigation(path: str, leap: LeapSeconds) -> Table:
     is_glonass = names.astype("U1") == "R"
     kepler[~is_glonass] = _kepler(text.lines, start[~is_glonass], names[~is_glonass], epoch_ns[~is_glonass])
     glonass[is_glonass] = _glonass(text.lines, start[is_glonass], names[is_glonass], epoch_ns[is_glonass], leap)
-    damaged = ~(_finite(kepler) & _finite(glonass)) | (epoch_ns == 0)
+    damaged = ~(_finite(kepler) & _finite(glonass)) | (epoch_ns == 0) | (np.abs(kepler["toe_sow"]) > WEEK_S)
     rejected = {
         "message of another kind": int(other.sum()),
         "record cut short": int(cut.sum()),
@@ -102,6 +102,11 @@ def _value(lines: Lines, start: NDArray[np.intp], line: int, place: int) -> Floa
     return exponent_numbers(lines.field(start + line, 4 + 19 * place, 19))
 
 
+def _whole(values: Floats) -> NDArray[np.int64]:
+    """Flags (n,); all bits set where there is no number, or one too large for any."""
+    return np.where(np.abs(values) < _LARGEST_FLAGS, values, -1).astype(np.int64)
+
+
 def _kepler(lines: Lines, start: NDArray[np.intp], names: np.ndarray, epoch_ns: Times) -> NDArray[np.void]:
     records = np.zeros(len(start), KEPLER)
     records["sat"] = names
@@ -117,9 +122,8 @@ def _kepler(lines: Lines, start: NDArray[np.intp], names: np.ndarray, epoch_ns: 
     tgd = np.column_stack([_value(lines, start, 6, 2), _value(lines, start, 6, 3)])
     tgd[np.isin(system, ["G", "J"]), 1] = 0.0
     records["tgd"] = np.nan_to_num(tgd)
-    health = _value(lines, start, 6, 1)
-    records["health"] = np.where(np.isfinite(health) & (np.abs(health) < 1024), health, -1)
-    sources = np.nan_to_num(_value(lines, start, 5, 1)).astype(np.int64)
+    records["health"] = _whole(_value(lines, start, 6, 1))
+    sources = _whole(_value(lines, start, 5, 1))
     records["fnav"] = (system == "E") & ((sources & 0b10) != 0) & ((sources & 0b101) == 0)
     return records
 
@@ -133,8 +137,7 @@ def _glonass(lines: Lines, start: NDArray[np.intp], names: np.ndarray, epoch_ns:
     for axis in range(3):
         for place, name in enumerate(("pos", "vel", "acc")):
             records[name][:, axis] = _value(lines, start, axis + 1, place) * 1e3
-    health = _value(lines, start, 1, 3)
-    records["health"] = np.where(np.isfinite(health) & (np.abs(health) < 1024), health, -1)
+    records["health"] = _whole(_value(lines, start, 1, 3))
     records["channel"] = np.nan_to_num(_value(lines, start, 2, 3))
     return records
 

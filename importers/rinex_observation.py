@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from importers.log import Table
-from importers.range_rows import satellite_names
 from importers.rinex_text import Lines, RinexText, plain_numbers, read_rinex
 from importers.settings import RangeInput
 from importers.signals import DEFAULT_SIGNALS, SPEED_OF_LIGHT, carrier_hz
@@ -23,6 +22,8 @@ __all__ = ["is_rinex_observation", "read_rinex_observation"]
 _S = 1_000_000_000
 _FIELD, _STRIDE = 14, 16
 _BDT_BEHIND_GPS_S = 14
+_MORE = 30
+"""How many fields beyond those announced are looked for."""
 _EVENTS = (2, 3, 4, 5, 6)
 
 
@@ -141,12 +142,12 @@ def _read_system(
     rejected: Counter[str],
 ) -> list[dict[str, np.ndarray]]:
     """Columns of each code, of the lines of one system."""
-    length = lines.stop[rows] - lines.start[rows]
-    ink = lines.field(rows, 3 + _STRIDE * len(types), 1)[:, 0] != ord(" ")
-    surplus = (length > 3 + _STRIDE * len(types)) & ink
+    width = 3 + _STRIDE * len(types)
+    surplus = lines.stop[rows] - lines.start[rows] > width
+    surplus[surplus] = (lines.field(rows[surplus], width, _STRIDE * _MORE) != ord(" ")).any(axis=1)
     rejected["more observations than the header's types"] += int(surplus.sum())
     rows, t_ns = rows[~surplus], t_ns[~surplus]
-    sat = satellite_names(np.ascontiguousarray(lines.field(rows, 0, 3)).view("S3")[:, 0].astype("U3"))
+    sat = lines.satellites(rows)
     channel = np.array([channels.get(str(name), np.nan) for name in sat])
     seen = np.zeros(len(rows), dtype=bool)
     parts = []

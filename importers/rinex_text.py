@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from importers.range_rows import satellite_names
 from importers.text_table import read_bytes
 from navreplay.timeline import Floats, LogError
 
 __all__ = ["Lines", "RinexText", "exponent_numbers", "plain_numbers", "read_rinex"]
 
-_NEWLINE, _SPACE, _ZERO = 10, 32, 48
+_NEWLINE, _SPACE, _ZERO, _NOT_ASCII = 10, 32, 48, 128
 _HEADER_END = b"END OF HEADER"
 _LABEL = 60
 
@@ -35,6 +36,12 @@ class Lines:
         chars = self.buffer[np.minimum(place, len(self.buffer) - 1)]
         chars[place >= self.stop[rows][:, None]] = _SPACE
         return chars
+
+    def satellites(self, rows: NDArray[np.intp]) -> NDArray[np.str_]:
+        """Names (k,) that the lines rows (k,) begin with, empty where they name no satellite."""
+        chars = self.field(rows, 0, 3)
+        chars[chars >= _NOT_ASCII] = _SPACE
+        return satellite_names(np.ascontiguousarray(chars).view("S3")[:, 0].astype("U3"))
 
     def text(self, row: int) -> str:
         """One line."""

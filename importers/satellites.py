@@ -23,7 +23,8 @@ FAULTS = ("", "no ephemeris", "ephemeris beyond its validity", "satellite unheal
 _NONE, _OLD, _UNHEALTHY, _DAMAGED = 1, 2, 3, 4
 _HEALTH_BITS = {"G": 0x3F, "C": 0x1, "J": 0x3E, "E": 0x7, "R": 0x7}
 """The bits that concern L1, E1 or B1; of QZSS the lowest is that of L6."""
-_LOWEST_M, _HIGHEST_M = 1.5e7, 6e7
+_LOWEST_M, _HIGHEST_M = 8e6, 6e7
+"""Of the largest coordinate."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -53,8 +54,8 @@ def satellite_states(
         _fill_broadcast(states, np.flatnonzero(rows), records, sat, signal, t_ns, flight_s)
     if ephemerides.precise is not None:
         _fill_precise(states, ephemerides, sat, signal, t_ns, flight_s)
-    radius = np.linalg.norm(states.pos, axis=1)
-    damaged = (states.fault == 0) & ~((radius > _LOWEST_M) & (radius < _HIGHEST_M) & (np.abs(states.clock) < 0.1))
+    reach = np.abs(states.pos).max(axis=1)
+    damaged = (states.fault == 0) & ~((reach > _LOWEST_M) & (reach < _HIGHEST_M) & (np.abs(states.clock) < 0.1))
     states.fault[damaged] = _DAMAGED
     for values in (states.pos, states.vel, states.clock, states.drift):
         values[states.fault != 0] = np.nan
@@ -115,6 +116,8 @@ def _group_delay(records: NDArray[np.void], index: NDArray[np.intp], signal: np.
     """Delay (n,) [s] of a signal (n,) against what the clock of its record describes. GPS, QZSS, Galileo: it grows with the
     inverse square of the carrier (IS-GPS-200N, 20.3.3.3.3.2). BeiDou: TGD1 for B1, TGD2 for B2I, none for B3I, on which its
     clock rests."""
+    if len(index) == 0:
+        return np.empty(0)
     names, code = np.unique(signal, return_inverse=True)
     table = np.stack([_record_delays(records, str(name)) for name in names], axis=1)
     return np.asarray(table[index, code])

@@ -16,6 +16,7 @@ __all__ = ["is_sp3", "precise_orbits", "read_sp3"]
 
 _S = 1_000_000_000
 _NO_CLOCK_US = 999_999.0
+_FARTHEST_KM = 1e6
 _LEAST_EPOCHS = 10
 _BDT_BEHIND_GPS_S = 14
 
@@ -83,5 +84,7 @@ def _position(line: str) -> tuple[str, float, float, float, float] | None:
         x, y, z = (float(line[first : first + 14]) for first in (4, 18, 32))
         clock = float(line[46:60]) if line[46:60].strip() else _NO_CLOCK_US
     except ValueError:
+        return None
+    if not all(abs(value) < _FARTHEST_KM for value in (x, y, z)):
         return None
     return line[1:4], x, y, z, clock

@@ -10,7 +10,7 @@ from mcap.writer import Writer
 from importers import InputSettings, LogError, load_timeline
 from navreplay.earth import EARTH_RATE
 from navreplay.timeline import RangeSeries
-from tests.range_samples import SATS, SPEED_OF_LIGHT, START_NS, received, satellites, turned
+from tests.receiver_at_rest import SATS, SPEED_OF_LIGHT, START_NS, received, satellites, turned
 
 COLUMNS = "t,sat,pr,rate,cn0,x,y,z,vx,vy,vz"
 CORRECTED = {"satellite_clock": True, "relativity": True, "group_delay": True}
