@@ -29,25 +29,26 @@ def turn_about_pole(vectors: Floats, angle: Floats) -> Floats:
 
 def turn_to_reception(
     t_ns: Times, sat: np.ndarray, pseudorange: Floats, sat_pos_e: Floats, sat_vel_e: Floats, turned_s: Floats
-) -> tuple[Floats, Floats, bool]:
-    """Positions (n, 3) and velocities (n, 3) in axes of reception, and whether the receiver's place was found.
+) -> tuple[Floats, Floats, int, int]:
+    """Positions (n, 3) and velocities (n, 3) in axes of reception; the number of epochs by which the receiver's place was
+    sought, and that of those in which the ranges meet in one.
 
     Rows in the order of time; pseudorange: (n,) [m] with the satellite clock added; turned_s: (n,) flight times by which the
     states are turned already. Without a place (never enough satellites) the receiver's clock is taken as right.
     """
-    times, places = rough_positions(t_ns, sat, pseudorange, sat_pos_e)
+    times, places, tried = rough_positions(t_ns, sat, pseudorange, sat_pos_e)
     if len(times):
         receiver = np.column_stack([np.interp(t_ns, times, axis) for axis in places.T])
         flight_s = np.linalg.norm(sat_pos_e - receiver, axis=1) / SPEED_OF_LIGHT
     else:
         flight_s = pseudorange / SPEED_OF_LIGHT
     angle = EARTH_RATE * (flight_s - turned_s)
-    return turn_about_pole(sat_pos_e, angle), turn_about_pole(sat_vel_e, angle), bool(len(times))
+    return turn_about_pole(sat_pos_e, angle), turn_about_pole(sat_vel_e, angle), tried, len(times)
 
 
-def rough_positions(t_ns: Times, sat: np.ndarray, pseudorange: Floats, sat_pos_e: Floats) -> tuple[Times, Floats]:
+def rough_positions(t_ns: Times, sat: np.ndarray, pseudorange: Floats, sat_pos_e: Floats) -> tuple[Times, Floats, int]:
     """Times (k,) and Earth-fixed positions (k, 3) [m] by unweighted least squares, good to about 100 m, at most one a second;
-    epochs that do not fit are left out. One clock per system."""
+    epochs that do not fit are left out. One clock per system. And the number of epochs tried."""
     starts = np.flatnonzero(np.diff(t_ns, prepend=t_ns[0] - 1))
     counts = np.diff(np.append(starts, len(t_ns)))
     systems, system = np.unique(sat.astype("U1"), return_inverse=True)
@@ -56,7 +57,7 @@ def rough_positions(t_ns: Times, sat: np.ndarray, pseudorange: Floats, sat_pos_e
     chosen = np.flatnonzero(counts >= 3 + seen.sum(axis=1))
     chosen = chosen[_thin(t_ns[starts[chosen]])]
     if len(chosen) == 0:
-        return np.empty(0, dtype=np.int64), np.empty((0, 3))
+        return np.empty(0, dtype=np.int64), np.empty((0, 3)), 0
     place = np.arange(counts[chosen].max())
     there = place < counts[chosen][:, None]
     rows = np.where(there, starts[chosen][:, None] + place, starts[chosen][:, None])
@@ -65,7 +66,7 @@ def rough_positions(t_ns: Times, sat: np.ndarray, pseudorange: Floats, sat_pos_e
     rms = np.sqrt((residual**2).sum(axis=1) / there.sum(axis=1))
     radius = np.linalg.norm(unknowns[:, :3], axis=1)
     good = (rms < _LARGEST_RESIDUAL_M) & (radius > _LEAST_RADIUS_M) & (radius < _LARGEST_RADIUS_M)
-    return t_ns[starts[chosen]][good], unknowns[good, :3]
+    return t_ns[starts[chosen]][good], unknowns[good, :3], len(chosen)
 
 
 def _thin(times: Times) -> np.ndarray:

@@ -24,6 +24,7 @@ __all__ = ["convert_ranges", "flat_source"]
 _EARLIEST_NS = 315_000_000 * 10**9
 _LEAST_M, _LARGEST_M = 1e6, 1e8
 _FASTEST_MPS = 1e5
+_ENOUGH_EPOCHS = 3
 _FREE = Applied.IONOSPHERE | Applied.TROPOSPHERE
 
 
@@ -130,10 +131,15 @@ def _build(name: str, rows: RangeRows, klobuchar: Floats | None) -> tuple[RangeS
     if len(turn):
         by_pseudorange = (rows.applied[turn] & Applied.TURNED_BY_PSEUDORANGE) != 0
         turned_s = np.where(by_pseudorange, rows.pseudorange[turn] / SPEED_OF_LIGHT, 0.0)
-        pos[turn], vel[turn], found = turn_to_reception(
+        pos[turn], vel[turn], tried, met = turn_to_reception(
             rows.t_ns[turn], rows.sat[turn], rows.pseudorange[turn], pos[turn], vel[turn], turned_s
         )
-        if not found:
+        if met == 0 and tried >= _ENOUGH_EPOCHS:
+            raise LogError(
+                f"{name}: its pseudoranges meet nowhere, in none of {tried} epochs within a kilometre; are its stamps in "
+                "another time scale than said (leap seconds: set input.range.time_offset_s), or the ephemerides of another day?"
+            )
+        if met == 0:
             notes.append(
                 f"{name}: no epoch has satellites enough to tell the receiver's clock, which is taken as right for flight times"
             )

@@ -123,6 +123,11 @@ def test_ephemerides_of_another_week_are_told(files: tuple[Path, Path]) -> None:
         load(observations, navigation)
 
 
+def test_stamps_in_another_time_scale_are_told(files: tuple[Path, Path]) -> None:
+    with pytest.raises(LogError, match=r"its pseudoranges meet nowhere.*leap seconds: set input\.range\.time_offset_s"):
+        load(*files, range={"time_offset_s": -18.0})
+
+
 def test_unhealthy_satellites_are_rejected(files: tuple[Path, Path]) -> None:
     observations, navigation = files
     lines = navigation.read_text().splitlines()
