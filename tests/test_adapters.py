@@ -225,6 +225,17 @@ def test_strong_tracking_factor_is_the_printed_one():
         assert adapted.prior.cov[0, 0] == pytest.approx(2.0 * max(1.0, (square - 3.0) / 2.0))
 
 
+def test_strong_tracking_multiplies_what_the_measurement_sees():
+    prior, z = draw_problem(1)
+    innovation = Linearised().innovate(prior, z._replace(residual=z.residual + 100))
+    adapter = StrongTracking()
+    wider = Linearised().innovate(adapter.adapt(adapter.init(), prior, innovation).prior, z)
+    factor = wider.spread[0, 0] / innovation.spread[0, 0]
+    assert factor > 2
+    np.testing.assert_allclose(wider.spread, factor * innovation.spread, rtol=1e-6)
+    np.testing.assert_allclose(wider.cross, factor * innovation.cross, rtol=1e-6)
+
+
 @pytest.mark.parametrize(("name", "least"), [("student-t", 20.0), ("correntropy", 40.0)])
 def test_robust_adapters_enlarge_the_noise_of_an_outlier_only(name, least):
     adapter = build_method(name).adapter
