@@ -63,7 +63,7 @@ def range_columns(columns: Mapping[str, np.ndarray], mapping: CsvMapping, place:
     for key, names in (("sat_pos_e", ("sat_x", "sat_y", "sat_z")), ("sat_vel_e", ("sat_vx", "sat_vy", "sat_vz"))):
         if columns.keys() >= set(names):
             out[key] = np.column_stack([columns[name] for name in names]).astype(np.float64)
-    applied = _stated(mapping)
+    applied = _stated(mapping.corrections)
     correction: Floats = np.zeros(len(sat))
     for name, (factor, meaning) in _ADDED.items():
         if name in columns:
@@ -74,14 +74,20 @@ def range_columns(columns: Mapping[str, np.ndarray], mapping: CsvMapping, place:
     return out
 
 
-def _stated(mapping: CsvMapping) -> Applied:
-    stated = mapping.corrections
+def _stated(corrections: RangeCorrections) -> Applied:
+    stated = {
+        Applied.SATELLITE_CLOCK: corrections.satellite_clock,
+        Applied.RELATIVITY: corrections.relativity,
+        Applied.GROUP_DELAY: corrections.group_delay,
+        Applied.IONOSPHERE: corrections.ionosphere,
+        Applied.TROPOSPHERE: corrections.troposphere,
+        Applied.TURNED: corrections.sagnac == "applied",
+        Applied.TURNED_BY_PSEUDORANGE: corrections.sagnac == "pseudorange",
+    }
     applied = Applied(0)
-    for meaning in Applied:
-        if getattr(stated, meaning.name.lower() if meaning.name else "", False):
-            applied |= meaning
-    turned = {"none": Applied(0), "applied": Applied.TURNED, "pseudorange": Applied.TURNED_BY_PSEUDORANGE}
-    return applied | turned[stated.sagnac]
+    for meaning, is_in in stated.items():
+        applied |= meaning if is_in else Applied(0)
+    return applied
 
 
 def _satellites(values: np.ndarray, mapping: CsvMapping) -> np.ndarray:

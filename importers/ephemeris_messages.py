@@ -67,8 +67,13 @@ EPHEMERIS_TYPES: Mapping[str, Reader] = {
     "sp3": _sp3,
     "ubx/RXM-SFRBX": _words,
     "ublox_msgs/RxmSFRBX": _words,
-    "gnss_comm/GnssEphemMsg": _gnss_comm,
-    "gnss_comm/GnssGloEphemMsg": _gnss_comm_glonass,
-    "gnss_comm/StampedFloat64Array": _ionosphere,
+} | {
+    f"{package}/{name}": reader
+    for package in ("gnss_comm", "gnss_comm_msgs")
+    for name, reader in (
+        ("GnssEphemMsg", _gnss_comm),
+        ("GnssGloEphemMsg", _gnss_comm_glonass),
+        ("StampedFloat64Array", _ionosphere),
+    )
 }
 """By type (without the ``/msg/`` of ROS 2)."""

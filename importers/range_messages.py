@@ -94,6 +94,7 @@ RANGE_TYPES: Mapping[str, Callable[[Table], Table]] = {
     "ubx/RXM-RAWX": _as_they_are,
     "navreplay.GnssRanges": _own,
     "gnss_comm/GnssMeasMsg": gnss_comm_ranges,
+    "gnss_comm_msgs/GnssMeasMsg": gnss_comm_ranges,
     "ublox_msgs/RxmRAWX": ublox_ranges,
 }
 """By type (without the ``/msg/`` of ROS 2), what makes a table per observation of the table of its messages."""

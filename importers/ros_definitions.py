@@ -14,6 +14,7 @@ from rosbags.typesys.base import normalize_fieldname
 from rosbags.typesys.msg import normalize_msgtype
 from rosbags.typesys.store import Typestore
 
+from importers.gnss_definitions import DEFINITIONS
 from importers.message_leaves import Kind, Leaf
 from navreplay.timeline import LogError
 
@@ -54,8 +55,9 @@ class RosType:
 def find_type(name: str, definition: str, language: str, encoding: str) -> RosType:
     """The type of this name (either style).
 
-    definition: text out of the log, empty where it has none (then the standard types of ROS are searched). language:
-    ``msg`` or ``idl``. encoding: ``cdr`` or ``ros1``. Raises LogError for an unknown type or a definition that does not parse.
+    definition: text out of the log, empty where it has none (then the standard types of ROS are searched, and `DEFINITIONS`).
+    language: ``msg`` or ``idl``. encoding: ``cdr`` or ``ros1``. Raises LogError for an unknown type or a definition that does
+    not parse.
     """
     name = normalize_msgtype(name)
     if definition.strip():
@@ -63,6 +65,8 @@ def find_type(name: str, definition: str, language: str, encoding: str) -> RosTy
     else:
         # Recorders since ROS 2 Iron store definitions, so a log without them is at most as new as Humble.
         store = get_typestore(Stores.ROS1_NOETIC if encoding == "ros1" else Stores.ROS2_HUMBLE)
+        for known, text in DEFINITIONS.items() if name in DEFINITIONS else ():
+            store.register(get_types_from_msg(text, known))
     if name not in store.fielddefs:
         raise LogError(
             f"type {name} is not defined in the log and is no standard type of ROS; record its definition with the log"

@@ -190,10 +190,12 @@ class RangeInput(_Settings):
 
     channel: str | None = None
     time_offset_s: float = 0.0
-    systems: tuple[System, ...] = ("G", "E", "C", "J", "R")
-    signals: dict[System, tuple[Signal, ...]] = Field(default_factory=dict)
-    min_cn0_dbhz: float = Field(default=0.0, ge=0)
-    navigation: tuple[Path, ...] = ()
+    systems: tuple[System, ...] = Field(("G", "E", "C", "J", "R"), description="systems to use, by their RINEX letters")
+    signals: dict[System, tuple[Signal, ...]] = Field(
+        default_factory=dict, description='by system, best first, such as { G = ["5Q", "5I"] }; else those of L1, E1 and B1'
+    )
+    min_cn0_dbhz: float = Field(default=0.0, ge=0, description="reject weaker signals [dB-Hz]")
+    navigation: tuple[Path, ...] = Field((), description="files with ephemerides: RINEX navigation, SP3")
 
 
 class RangeCorrections(_Settings):

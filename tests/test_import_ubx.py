@@ -1,6 +1,8 @@
 """u-blox streams and ROS messages of u-blox receivers: the same measurements, and damage that costs itself only."""
 
+import sqlite3
 import struct
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -207,8 +209,8 @@ def as_ros(store: Any, names: dict[str, str], kind: int, payload: bytes) -> tupl
     return "/rawx", store.types["ublox_msgs/msg/RxmRAWX"](*head[:6], np.frombuffer(head[6], np.uint8), meas)
 
 
-@pytest.mark.parametrize("ros", [1, 2])
-def test_ros_messages_hold_the_same(tmp_path: Path, ros: int) -> None:
+@pytest.mark.parametrize("ros", [1, 2, "2 without definitions"])
+def test_ros_messages_hold_the_same(tmp_path: Path, ros: int | str) -> None:
     names, base = (OLD, Stores.ROS1_NOETIC) if ros == 1 else (NEW, Stores.ROS2_HUMBLE)
     store = get_typestore(base)
     types: dict[str, Any] = {}
@@ -216,7 +218,7 @@ def test_ros_messages_hold_the_same(tmp_path: Path, ros: int) -> None:
         types |= get_types_from_msg(text, name)
     store.register(types)
     path = tmp_path / ("a.bag" if ros == 1 else "bag")
-    writer = Ros1Writer(path) if ros == 1 else Ros2Writer(path, version=8, storage_plugin=StoragePlugin.SQLITE3)
+    writer = Ros1Writer(path) if ros == 1 else Ros2Writer(path, version=9, storage_plugin=StoragePlugin.SQLITE3)
     serialize = store.serialize_ros1 if ros == 1 else store.serialize_cdr
     with writer:
         connections: dict[str, Any] = {}
@@ -225,6 +227,10 @@ def test_ros_messages_hold_the_same(tmp_path: Path, ros: int) -> None:
             if topic not in connections:
                 connections[topic] = writer.add_connection(topic, message.__msgtype__, typestore=store)
             writer.write(connections[topic], 1_756_402_239 * 10**9 + i, serialize(message, message.__msgtype__))
+    if ros == "2 without definitions":
+        (file,) = path.glob("*.db3")
+        with closing(sqlite3.connect(file)) as database, database:
+            assert database.execute("DELETE FROM message_definitions").rowcount >= 2
     ranges, stream = ranges_of(path), ranges_of(SAMPLE)
     for column in ("t_ns", "sat", "signal", "pseudorange", "range_rate", "cn0", "pseudorange_std", "sat_pos_e", "sat_vel_e"):
         assert np.array_equal(getattr(ranges, column), getattr(stream, column)), column
