@@ -62,6 +62,15 @@ def test_help_imports_nothing_heavy():
     assert done.stdout.splitlines()[-1] == "[]"
 
 
+def test_a_run_loads_nothing_slow_that_only_few_methods_need():
+    code = (
+        "import sys, pipelines.process, pipelines.outputs\n"
+        "print(sorted({'scipy.optimize', 'scipy.signal', 'rerun'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
 def test_the_version_is_told(capsys):
     with pytest.raises(SystemExit) as caught:
         cli.main(["--version"])

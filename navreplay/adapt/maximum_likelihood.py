@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import differential_evolution, minimize
 
 from navreplay.adapt.adapter import Adaptation
 from navreplay.adapt.likelihood import Stack, misfit, stack_innovations
@@ -68,6 +67,8 @@ class MaximumLikelihood:
     def solve(self, stack: Stack, start: Floats) -> Floats:
         """log_ratio (m,) of the least misfit, searched from start (m,)."""
         # in units that make the curvature about 1, the first step of SQP is nearly Newton's
+        from scipy.optimize import minimize  # slow to load, and hardly any other method needs it
+
         unit = 1 / np.sqrt(np.maximum(misfit(start, stack)[2], _LEAST_CURVATURE))
 
         def objective(x: Floats) -> tuple[float, Floats]:
@@ -91,6 +92,8 @@ class GeneticLikelihood(MaximumLikelihood):
 
     def solve(self, stack: Stack, start: Floats) -> Floats:
         """log_ratio (m,) of the least misfit found, start (m,) being one of the first generation."""
+        from scipy.optimize import differential_evolution  # as above
+
         bounds = [(np.log(self.floor), np.log(self.ceiling))] * len(start)
         found = differential_evolution(
             lambda members: np.array([misfit(log_ratio, stack)[0] for log_ratio in members.T]),

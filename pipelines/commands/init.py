@@ -40,4 +40,4 @@ def _notes(inspection: Inspection) -> list[str]:
     notes += [f"Assumed: {text}" for text in inspection.assumptions]
     for role, names in inspection.candidates.items():
         notes.append(f"To decide: {SETTING[role]} = one of {', '.join(names)}")
-    return notes + [f"{finding.level.capitalize()}: {finding.text}" for finding in inspection.findings]
+    return notes + [f"{finding.level.capitalize()}: {finding.text} {finding.hint}".rstrip() for finding in inspection.findings]
