@@ -91,6 +91,10 @@ class ErmakfDerived:
         if enough.any():
             differences, count = differences[enough], count[enough]
             longest = np.maximum(np.minimum(self.longest_lag, count // 3), 1)
-            variance, _ = fit_correlation(lag_variances(differences, count, self.longest_lag), longest)
-            ratio[enough] = np.maximum(variance, self.floor)
+            fitted = fit_correlation(lag_variances(differences, count, self.longest_lag), longest)
+            ratio[enough] = np.maximum(self._weigh(*fitted), self.floor)
         return Adaptation(prior, scale_noise(innovation.noise, ratio), {**state, **trails})
+
+    def _weigh(self, variance: Floats, time_constant: Floats) -> Floats:
+        """R over told (k,) for noise of that variance (k,) and time constant (k,) [epochs]."""
+        return variance

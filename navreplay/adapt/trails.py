@@ -40,9 +40,9 @@ Trails = Mapping[str, Trail]
 def remove_common(labels: tuple[str, ...], values: Floats, variances: Floats) -> Floats:
     """values (m,) of an epoch less what the receiver clock adds to all of a kind; NaN stand for unknown ones and stay.
 
-    The common part is the mean weighted by variances (m,) without those further than four robust sigmas from the median. A mean,
-    since its sum over epochs is the mean of the sums, which no median's is: over many epochs that would look like correlated
-    noise. What is left is stretched to the variance that it had with its own share in the mean.
+    The common part is the mean weighted by variances (m,) without those further than four robust sigmas from the median. It is
+    a mean because its sum over epochs is the mean of the sums; a median's is not, and would look like correlated noise. What
+    is left is stretched to the variance that it had with its own share in the mean.
     """
     result = values.copy()
     for kind in _CLOCKED:

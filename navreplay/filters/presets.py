@@ -11,6 +11,7 @@ from navreplay.adapt.eiakf import Eiakf
 from navreplay.adapt.em import Em, PrintedEm
 from navreplay.adapt.ermakf import Ermakf
 from navreplay.adapt.ermakf_derived import ErmakfDerived
+from navreplay.adapt.ermakf_whitened import ErmakfWhitened
 from navreplay.adapt.fixed import Fixed
 from navreplay.adapt.h_infinity import HInfinity
 from navreplay.adapt.huber import Huber
@@ -72,6 +73,7 @@ PRESETS: dict[str, Preset] = {
         Preset("srmakf", "R from differences of consecutive epochs against the INS (Ge et al. 2020)", Srmakf),
         Preset("ermakf", "srmakf with random weights, and Burg's method where noise is doubtful (Ge et al. 2020)", Ermakf),
         Preset("ermakf-derived", "R from differences over several epochs, fitted for variance and correlation", ErmakfDerived),
+        Preset("ermakf-whitened", "ermakf-derived with R enlarged for noise that stays", ErmakfWhitened),
     )
 }
 

@@ -1,0 +1,28 @@
+"""Redundant-measurement filter for correlated noise that also allows for its staying.
+
+Source: own, on top of `ermakf_derived`, which finds variance s^2 and time constant T of each component's noise. A filter that
+takes noise for white averages it away sooner than it goes. White noise of variance s^2 (1 + rho) / (1 - rho), with
+rho = exp(-1 / T), has the same spectral density at low frequencies, hence the same effect on a slow state, and that is the
+R used here.
+Assumes: as `ermakf_derived`; and states that change slowly against T, so that low frequencies are what counts.
+Fails: as `ermakf_derived`, more so, since T multiplies what s^2 is uncertain by; velocities and attitudes that change within T
+could learn more from correlated measurements than this R lets them.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from navreplay.adapt.ermakf_derived import ErmakfDerived
+from navreplay.timeline import Floats
+
+__all__ = ["ErmakfWhitened"]
+
+
+@dataclass(frozen=True, slots=True)
+class ErmakfWhitened(ErmakfDerived):
+    """Parameters as of `ErmakfDerived`."""
+
+    def _weigh(self, variance: Floats, time_constant: Floats) -> Floats:
+        rho = np.exp(-1 / time_constant)
+        return np.asarray(variance * (1 + rho) / (1 - rho))
