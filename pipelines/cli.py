@@ -55,7 +55,17 @@ def _build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    for add in (_add_inspect, _add_init, _add_run, _add_compare, _add_synth, _add_export, _add_filters, _add_formats):
+    for add in (
+        _add_inspect,
+        _add_init,
+        _add_run,
+        _add_compare,
+        _add_synth,
+        _add_experiment,
+        _add_export,
+        _add_filters,
+        _add_formats,
+    ):
         add(commands)
     return parser
 
@@ -126,6 +136,15 @@ def _add_synth(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser.add_argument("--seed", metavar="N", type=int, default=0, help="seed of all randomness (default 0)")
     parser.add_argument("-o", "--out", metavar="FILE", type=Path, help="log to write; its extension names the format")
     parser.add_argument("--force", action="store_true", help="overwrite files that exist")
+
+
+def _add_experiment(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    parser = _add_command(commands, "experiment", "compare methods with each other and with a paper, over many seeds")
+    parser.add_argument("experiment", metavar="NAME", help="name of an experiment; 'list' lists them")
+    parser.add_argument("--seeds", metavar="N", type=int, default=20, help="how many seeds (default 20)")
+    parser.add_argument("--jobs", metavar="J", type=int, default=0, help="processes (default: one per core)")
+    parser.add_argument("--quiet", action="store_true", help="no progress bar, no summary")
+    _add_out(parser, "OUT", "folder for the results", required=False)
 
 
 def _add_export(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:

@@ -48,21 +48,21 @@ def build_report(result: RunResult) -> Report:
         "versions": _versions(),
         "drive": _describe_drive(solution),
         "errors": None if evaluation is None else _describe_errors(evaluation),
-        "nees": None if evaluation is None else {name: _plain(judged) for name, judged in evaluation.nees.items()},
-        "within_3_sigma": None if evaluation is None else _plain(evaluation.within_3_sigma),
-        "nis": {kind: _plain(judged) for kind, judged in compute_nis(solution.innovations).items()},
+        "nees": None if evaluation is None else {name: plain_data(judged) for name, judged in evaluation.nees.items()},
+        "within_3_sigma": None if evaluation is None else plain_data(evaluation.within_3_sigma),
+        "nis": {kind: plain_data(judged) for kind, judged in compute_nis(solution.innovations).items()},
         "innovations": {series.kind: _describe_innovations(series) for series in solution.innovations},
         "outages": {
             "count": len(outages),
             "counted": len(count_outages(outages)),
-            "summary": {name: _plain(statistics) for name, statistics in summarise_outages(outages).items()},
+            "summary": {name: plain_data(statistics) for name, statistics in summarise_outages(outages).items()},
             "list": [_describe_outage(outage, int(solution.t_ns[0])) for outage in outages],
         },
         **_describe_provenance(result.timeline.provenance),
         "findings": [asdict(finding) for finding in result.findings],
         "events": _describe_events(solution),
-        "configuration": _plain(result.config.model_dump(mode="json")),
-        "timing_s": _plain(result.timing_s),
+        "configuration": plain_data(result.config.model_dump(mode="json")),
+        "timing_s": plain_data(result.timing_s),
     }
 
 
@@ -78,14 +78,14 @@ def outage_errors(result: RunResult) -> tuple[OutageErrors, ...]:
     return assess_outages(result.solution, result.solution.outages or find_outages(result.solution))
 
 
-def _plain(value: object) -> Any:
+def plain_data(value: object) -> Any:
     """Data classes and mappings as dictionaries, figures to nine digits, what is not finite as None."""
     if isinstance(value, Statistics | Consistency):
-        return _plain(asdict(value))
+        return plain_data(asdict(value))
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): plain_data(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
+        return [plain_data(item) for item in value]
     if isinstance(value, float):
         return float(f"{value:.9g}") if math.isfinite(value) else None
     return value
@@ -110,7 +110,7 @@ def _describe_drive(solution: Solution) -> dict[str, Any]:
         "start_gps_week": int(week[0]),
         "start_gps_tow_s": float(tow[0]),
         "duration_s": (int(solution.t_ns[-1]) - int(solution.t_ns[0])) / 1e9,
-        "distance_m": _plain(float(np.linalg.norm(steps, axis=1).sum())),
+        "distance_m": plain_data(float(np.linalg.norm(steps, axis=1).sum())),
         "rows": len(solution),
         "states": list(solution.state_names),
     }
@@ -123,7 +123,7 @@ def _describe_errors(evaluation: Evaluation) -> dict[str, Any]:
         for quantity, table in tables.items():
             unit = evaluation.errors[quantity].unit
             factor = math.degrees(1) if unit == "rad" else 1.0
-            figures = {component: _plain(_scale(statistics, factor)) for component, statistics in table.items()}
+            figures = {component: plain_data(_scale(statistics, factor)) for component, statistics in table.items()}
             described[stretch][quantity] = {"unit": "deg" if unit == "rad" else unit, **figures}
     return described
 
@@ -143,9 +143,9 @@ def _describe_innovations(series: InnovationSeries) -> dict[str, Any]:
         "rejected": {reason: rejected.count(reason) for reason in sorted(set(rejected))},
         "components": {
             label: {
-                "residual": _plain(summarise(series.residual[series.used, i])),
-                "normalised": _plain(summarise(series.residual[series.used, i] / series.std[series.used, i])),
-                "noise_over_nominal": _plain(summarise(ratio[series.used, i])),
+                "residual": plain_data(summarise(series.residual[series.used, i])),
+                "normalised": plain_data(summarise(series.residual[series.used, i] / series.std[series.used, i])),
+                "noise_over_nominal": plain_data(summarise(ratio[series.used, i])),
             }
             for i, label in enumerate(series.labels)
         },
@@ -164,11 +164,11 @@ def _describe_outage(errors: OutageErrors, origin_ns: int) -> dict[str, Any]:
         "start_elapsed_s": (outage.start_ns - origin_ns) / 1e9,
         "cause": outage.cause,
         "length_s": errors.length_s,
-        "distance_m": _plain(errors.distance_m),
-        "end_horizontal_m": _plain(errors.end_horizontal),
-        "end_3d_m": _plain(errors.end_3d),
-        "max_horizontal_m": _plain(errors.max_horizontal),
-        "max_3d_m": _plain(errors.max_3d),
+        "distance_m": plain_data(errors.distance_m),
+        "end_horizontal_m": plain_data(errors.end_horizontal),
+        "end_3d_m": plain_data(errors.end_3d),
+        "max_horizontal_m": plain_data(errors.max_horizontal),
+        "max_3d_m": plain_data(errors.max_3d),
     }
 
 

@@ -1,0 +1,202 @@
+"""Experiments: methods against each other and against a paper, on a synthetic scenario over many seeds."""
+
+import multiprocessing
+import os
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import partial
+from time import perf_counter
+
+import numpy as np
+
+from navreplay.filters.presets import build_method
+from navreplay.filters.run import run_filter
+from navreplay.metrics import evaluate
+from navreplay.options import FilterOptions
+from navreplay.solution import Solution
+from navreplay.timeline import Floats, LogError, Times, Trajectory
+from pipelines.told_noise import Knowledge, NoiseRatio, compare_noise, tell
+from synthetic_logs.simulation import Scenario, SyntheticLog, simulate
+
+__all__ = [
+    "QUANTITIES",
+    "Arm",
+    "ArmOutcome",
+    "Experiment",
+    "NoiseClaim",
+    "OrderClaim",
+    "Outcome",
+    "Published",
+    "Stretch",
+    "run_experiment",
+    "run_seed",
+]
+
+QUANTITIES = ("position", "velocity", "attitude")
+
+
+@dataclass(frozen=True, slots=True)
+class Arm:
+    """One line of an experiment's tables. method: a preset, with parameters. told: what of the true noise it knows."""
+
+    label: str
+    method: str
+    parameters: Mapping[str, object] = field(default_factory=dict)
+    told: Knowledge = "log"
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """Part of a scenario: windows (start, end) in seconds from the start of the log, the end excluded."""
+
+    name: str
+    windows: tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Published:
+    """A row of a paper's table: root mean square errors by label of the arm, of a quantity (see `rmse_figures`) in a stretch.
+    source: where in the paper."""
+
+    source: str
+    stretch: str
+    quantity: str
+    figures: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class OrderClaim:
+    """A paper's statement that one arm's error is smaller than another's. source: where, and by how much."""
+
+    source: str
+    stretch: str
+    quantity: str
+    better: str
+    worse: str
+
+
+@dataclass(frozen=True, slots=True)
+class NoiseClaim:
+    """An explanation to be tested: the median ratio of the R an arm uses to the true one, for a kind of measurement in a
+    stretch, lies between low and high. text: what the paper says."""
+
+    text: str
+    stretch: str
+    kind: str
+    arm: str
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True)
+class Experiment:
+    """Everything that decides an experiment but the seeds. description is one line, paper names the source. arms: the first is
+    the reference of paired differences. drawn: labels of up to six arms that the plots show. notes: readings, choices."""
+
+    name: str
+    description: str
+    paper: str
+    scenario: Scenario
+    options: FilterOptions
+    arms: tuple[Arm, ...]
+    stretches: tuple[Stretch, ...]
+    drawn: tuple[str, ...]
+    published: tuple[Published, ...] = ()
+    orders: tuple[OrderClaim, ...] = ()
+    noise_claims: tuple[NoiseClaim, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ArmOutcome:
+    """One arm on one seed. errors (k, 9): position NED [m], velocity NED [m/s] and rotation vector NED [rad], estimated minus
+    true. nees (k, 3): of the three. Both NaN where the solution does not reach. noise: by kind of measurement."""
+
+    errors: Floats
+    nees: Floats
+    noise: Mapping[str, NoiseRatio]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Outcome:
+    """All arms on one seed, at times t_s (k,) from the start of the log. failures: by arm, why it gave no solution. seconds: by
+    arm, what filtering took."""
+
+    seed: int
+    t_s: Floats
+    arms: Mapping[str, ArmOutcome]
+    failures: Mapping[str, str]
+    seconds: Mapping[str, float]
+
+
+def run_experiment(
+    experiment: Experiment, seeds: int, jobs: int, progress: Callable[[str, float], None] | None = None
+) -> tuple[Outcome, ...]:
+    """The outcomes of seeds 1 to `seeds`, in their order, computed by `jobs` processes.
+
+    Every arm sees the same log of a seed, so that differences between arms are paired. Each seed is computed by a process of
+    one thread, whatever jobs is, so that outcomes do not depend on it. Raises LogError for fewer than one seed or job.
+    """
+    if seeds < 1 or jobs < 1:
+        raise LogError(f"experiment: at least one seed and one job are needed, got {seeds} and {jobs}")
+    outcomes = []
+    with _single_threaded(), ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) as pool:
+        for done, outcome in enumerate(pool.map(partial(run_seed, experiment), range(1, seeds + 1)), start=1):
+            outcomes.append(outcome)
+            if progress is not None:
+                progress(experiment.name, done / seeds)
+    return tuple(outcomes)
+
+
+@contextmanager
+def _single_threaded() -> Iterator[None]:
+    """Processes started within take one thread each for linear algebra."""
+    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+    before = {name: os.environ.get(name) for name in names}
+    os.environ.update(dict.fromkeys(names, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+def run_seed(experiment: Experiment, seed: int) -> Outcome:
+    """All arms on the log of one seed. An arm that a LogError stops is a failure of that arm."""
+    log = simulate(experiment.scenario, seed)
+    t_ns = _judged_epochs(log)
+    arms, failures, seconds = {}, {}, {}
+    for arm in experiment.arms:
+        begin = perf_counter()
+        try:
+            solution = run_filter(tell(log, arm.told), build_method(arm.method, arm.parameters), experiment.options)
+        except LogError as error:
+            failures[arm.label] = str(error)
+            continue
+        seconds[arm.label] = perf_counter() - begin
+        arms[arm.label] = _judge(solution, log, t_ns)
+    return Outcome(seed, (t_ns - log.scenario.journey.start_ns) / 1e9, arms, failures, seconds)
+
+
+def _judged_epochs(log: SyntheticLog) -> Times:
+    """Once a second, on the half second: between the epochs of a receiver that measures on the second."""
+    t_ns = log.truth.t_ns
+    return t_ns[(t_ns % 1_000_000_000) == 500_000_000]
+
+
+def _judge(solution: Solution, log: SyntheticLog, t_ns: Times) -> ArmOutcome:
+    rows = np.isin(log.truth.t_ns, t_ns)
+    truth = log.truth
+    reference = Trajectory(t_ns, truth.lla[rows], truth.vel_n[rows], truth.q_nb[rows], truth.cov_pos[rows])
+    evaluation = evaluate(solution, reference)
+    at = np.searchsorted(t_ns, evaluation.t_ns)
+    errors, nees = np.full((len(t_ns), 9), np.nan), np.full((len(t_ns), 3), np.nan)
+    for i, quantity in enumerate(QUANTITIES):
+        errors[at, 3 * i : 3 * i + 3] = evaluation.errors[quantity].error
+        nees[at, i] = evaluation.errors[quantity].nees
+    return ArmOutcome(errors, nees, compare_noise(solution.innovations, log))

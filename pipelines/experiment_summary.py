@@ -1,0 +1,219 @@
+"""What an experiment has shown: figures over its seeds, and which of the paper's statements they support."""
+
+from collections.abc import Iterable, Sequence
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from scipy.special import chdtri, stdtrit
+
+from navreplay.timeline import Floats
+from pipelines.experiment import QUANTITIES, ArmOutcome, Experiment, OrderClaim, Outcome, Stretch
+from pipelines.report import Report, plain_data
+
+__all__ = ["WHOLE", "published_orders", "rmse_figures", "stretch_rows", "summarise_experiment"]
+
+WHOLE = Stretch("whole drive", ((0.0, float("inf")),))
+_AXES = {"position": ("north", "east", "down"), "velocity": ("north", "east", "down"), "attitude": ("north", "east", "heading")}
+_UNITS = {"position": "m", "velocity": "m/s", "attitude": "deg"}
+_SCHEMA = "navreplay experiment 1"
+
+
+def stretch_rows(stretch: Stretch, t_s: Floats) -> np.ndarray:
+    """(k,) bool: which of t_s (k,) [s] lie in the stretch."""
+    rows = np.zeros(len(t_s), dtype=np.bool_)
+    for start, end in stretch.windows:
+        rows |= (t_s >= start) & (t_s < end)
+    return rows
+
+
+def rmse_figures(errors: Floats) -> dict[str, float]:
+    """Root mean squares of errors (k, 9) by name: ``position`` of the 3-D error, ``position horizontal``, ``position north``
+    and so on, likewise velocity, and attitude [deg]. Rows of NaN are left out."""
+    squares = errors[np.isfinite(errors).all(axis=1)] ** 2
+    squares[:, 6:] *= np.degrees(1.0) ** 2
+    means = squares.mean(axis=0) if len(squares) else np.full(9, np.nan)
+    figures = {}
+    for i, quantity in enumerate(QUANTITIES):
+        part = means[3 * i : 3 * i + 3]
+        figures[quantity] = float(np.sqrt(part.sum()))
+        figures[f"{quantity} horizontal"] = float(np.sqrt(part[:2].sum()))
+        figures |= {f"{quantity} {axis}": float(np.sqrt(v)) for axis, v in zip(_AXES[quantity], part, strict=True)}
+    return figures
+
+
+def summarise_experiment(experiment: Experiment, outcomes: Sequence[Outcome]) -> Report:
+    """Plain data: for every arm and stretch the mean over seeds and its 95 % interval, consistency, R used over true; then the
+    published orders and explanations with what was measured of them."""
+    stretches = (*experiment.stretches, WHOLE)
+    figures = {
+        arm.label: {stretch.name: _seed_figures(arm.label, stretch, outcomes) for stretch in stretches}
+        for arm in experiment.arms
+    }
+    first = experiment.arms[0].label
+    arms = {
+        arm.label: {
+            "method": arm.method,
+            "parameters": dict(arm.parameters),
+            "told": arm.told,
+            "failures": {str(o.seed): o.failures[arm.label] for o in outcomes if arm.label in o.failures},
+            "seconds": float(np.mean([o.seconds[arm.label] for o in outcomes if arm.label in o.seconds] or [np.nan])),
+            "stretches": {
+                stretch.name: {
+                    "rmse": _intervals(figures[arm.label][stretch.name]),
+                    f"rmse_minus_{first}": _differences(figures[arm.label][stretch.name], figures[first][stretch.name]),
+                    "nees": _consistency(arm.label, stretch, outcomes),
+                    "noise_ratio": _noise_ratios(arm.label, stretch, outcomes),
+                }
+                for stretch in stretches
+            },
+        }
+        for arm in experiment.arms
+    }
+    orders = [_judge_order(claim, figures) for claim in (*published_orders(experiment), *experiment.orders)]
+    explanations = [
+        {
+            "text": claim.text,
+            "stretch": claim.stretch,
+            "kind": claim.kind,
+            "arm": claim.arm,
+            "low": claim.low,
+            "high": claim.high,
+            "measured": (ratio := arms[claim.arm]["stretches"][claim.stretch]["noise_ratio"].get(claim.kind, float("nan"))),
+            "holds": bool(claim.low < ratio < claim.high),
+        }
+        for claim in experiment.noise_claims
+    ]
+    return plain_data(
+        {
+            "schema": _SCHEMA,
+            "name": experiment.name,
+            "description": experiment.description,
+            "paper": experiment.paper,
+            "scenario": {"name": experiment.scenario.name, "description": experiment.scenario.description},
+            "seeds": [outcome.seed for outcome in outcomes],
+            "stretches": {stretch.name: stretch.windows for stretch in experiment.stretches},
+            "units": _UNITS,
+            "arms": arms,
+            "published": [
+                {"source": p.source, "stretch": p.stretch, "quantity": p.quantity, "figures": dict(p.figures)}
+                for p in experiment.published
+            ],
+            "orders": orders,
+            "explanations": explanations,
+            "conclusions": _conclude(orders, explanations, len(outcomes)),
+            "notes": experiment.notes,
+        }
+    )
+
+
+def _arms_of(label: str, outcomes: Sequence[Outcome]) -> Iterable[tuple[Outcome, ArmOutcome]]:
+    return ((outcome, outcome.arms[label]) for outcome in outcomes if label in outcome.arms)
+
+
+def _seed_figures(label: str, stretch: Stretch, outcomes: Sequence[Outcome]) -> dict[str, Floats]:
+    """By figure: its value on every seed, NaN where the arm failed."""
+    names = rmse_figures(np.zeros((1, 9)))
+    figures = {name: np.full(len(outcomes), np.nan) for name in names}
+    for i, outcome in enumerate(outcomes):
+        if label in outcome.arms:
+            rows = stretch_rows(stretch, outcome.t_s)
+            for name, value in rmse_figures(outcome.arms[label].errors[rows]).items():
+                figures[name][i] = value
+    return figures
+
+
+def _interval(values: Floats) -> dict[str, float]:
+    """Mean of values (n,) and half the width of its 95 % interval by Student's t; unknown for fewer than two."""
+    known = values[np.isfinite(values)]
+    n = len(known)
+    half = float(stdtrit(n - 1, 0.975) * known.std(ddof=1) / np.sqrt(n)) if n > 1 else float("nan")
+    return {"mean": float(known.mean()) if n else float("nan"), "half_width": half, "seeds": n}
+
+
+def _intervals(figures: dict[str, Floats]) -> dict[str, dict[str, float]]:
+    return {name: _interval(values) for name, values in figures.items()}
+
+
+def _differences(figures: dict[str, Floats], reference: dict[str, Floats]) -> dict[str, dict[str, float]]:
+    return {name: _interval(values - reference[name]) for name, values in figures.items()}
+
+
+def _consistency(label: str, stretch: Stretch, outcomes: Sequence[Outcome]) -> dict[str, dict[str, float]]:
+    """By quantity the mean NEES (3 expected), and the share of epochs whose average over seeds lies in its 95 % bounds (at
+    least 0.9 for a filter that is to be believed)."""
+    nees = [arm.nees[stretch_rows(stretch, outcome.t_s)] for outcome, arm in _arms_of(label, outcomes)]
+    if not nees:
+        return {}
+    averages, dof = np.mean(nees, axis=0), 3 * len(nees)
+    low, high = chdtri(dof, [0.975, 0.025]) / len(nees)
+    known = np.isfinite(averages)
+    inside = (averages > low) & (averages < high)
+    return {
+        quantity: {
+            "mean": float(averages[known[:, i], i].mean()) if known[:, i].any() else float("nan"),
+            "share_inside": float(inside[known[:, i], i].mean()) if known[:, i].any() else float("nan"),
+        }
+        for i, quantity in enumerate(QUANTITIES)
+    }
+
+
+def _noise_ratios(label: str, stretch: Stretch, outcomes: Sequence[Outcome]) -> dict[str, float]:
+    """By kind of measurement: median over seeds and measurements of R used over true."""
+    gathered: dict[str, list[Floats]] = {}
+    for _, arm in _arms_of(label, outcomes):
+        for kind, noise in arm.noise.items():
+            gathered.setdefault(kind, []).append(noise.ratio[stretch_rows(stretch, noise.t_s)])
+    joined = {kind: np.concatenate(parts) for kind, parts in gathered.items()}
+    return {kind: float(np.median(ratios)) for kind, ratios in joined.items() if len(ratios)}
+
+
+def published_orders(experiment: Experiment) -> tuple[OrderClaim, ...]:
+    """What the published tables say of every pair of arms; pairs of equal figures say nothing."""
+    claims = []
+    for row in experiment.published:
+        for one, other in combinations(row.figures, 2):
+            better, worse = sorted((one, other), key=row.figures.__getitem__)
+            if row.figures[better] < row.figures[worse]:
+                source = f"{row.source}: {row.figures[better]:g} < {row.figures[worse]:g}"
+                claims.append(OrderClaim(source, row.stretch, row.quantity, better, worse))
+    return tuple(claims)
+
+
+def _judge_order(claim: OrderClaim, figures: dict[str, dict[str, dict[str, Floats]]]) -> dict[str, Any]:
+    better, worse = (figures[label][claim.stretch][claim.quantity] for label in (claim.better, claim.worse))
+    gain = _interval(worse - better)
+    verdict = "undecided"
+    if abs(gain["mean"]) > gain["half_width"]:
+        verdict = "holds" if gain["mean"] > 0 else "contradicted"
+    return {
+        "source": claim.source,
+        "stretch": claim.stretch,
+        "quantity": claim.quantity,
+        "better": claim.better,
+        "worse": claim.worse,
+        "measured_better": _interval(better)["mean"],
+        "measured_worse": _interval(worse)["mean"],
+        "gain": gain,
+        "verdict": verdict,
+    }
+
+
+def _conclude(orders: Sequence[dict[str, Any]], explanations: Sequence[dict[str, Any]], seeds: int) -> tuple[str, ...]:
+    """Sentences: how much of the published order holds, and which explanations do."""
+    sentences = []
+    for stretch in dict.fromkeys(order["stretch"] for order in orders):
+        verdicts = [order["verdict"] for order in orders if order["stretch"] == stretch]
+        held, contradicted, open_ = (verdicts.count(verdict) for verdict in ("holds", "contradicted", "undecided"))
+        whole = "holds" if held == len(verdicts) else "does not hold as a whole"
+        sentences.append(
+            f"The published order in '{stretch}' {whole}: of {len(verdicts)} comparisons {held} hold, {contradicted} are "
+            f"contradicted and {open_} are undecided (paired differences over {seeds} seeds, 95 %)."
+        )
+    for explanation in explanations:
+        state = "holds" if explanation["holds"] else "does not hold"
+        sentences.append(
+            f"That {explanation['text']} {state}: R used over true is {explanation['measured']:.2g} (median) for "
+            f"{explanation['arm']}, {explanation['kind'].replace('_', ' ')}, in '{explanation['stretch']}'."
+        )
+    return tuple(sentences)
