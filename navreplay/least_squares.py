@@ -196,10 +196,9 @@ def _pad(epochs: RangeEpochs, block: slice) -> _Padded:
     index = first[:, None] + np.arange(widest)
     present = index < last[:, None]
     rows = np.minimum(index, len(epochs.sat) - 1)
-    # before correction the noise is unknown, and no weight is asked for
-    weight = np.where(present, np.nan_to_num(epochs.pseudorange_std[rows] ** -2.0, nan=1.0), 0.0)
+    weight = np.where(present, _weights(epochs.pseudorange_std)[rows], 0.0)
     has_rate = present & np.isfinite(epochs.range_rate[rows])
-    rate_weight = np.where(has_rate, np.nan_to_num(epochs.range_rate_std[rows] ** -2.0, nan=1.0), 0.0)
+    rate_weight = np.where(has_rate, _weights(epochs.range_rate_std)[rows], 0.0)
     membership = (epochs.group[rows][..., None] == np.arange(len(epochs.groups))) & present[..., None]
     return _Padded(
         present,
@@ -211,6 +210,11 @@ def _pad(epochs: RangeEpochs, block: slice) -> _Padded:
         epochs.sat_vel_e[rows],
         membership.astype(np.float64),
     )
+
+
+def _weights(std: Floats) -> Floats:
+    """Before correction the noise may be unknown, and weights do not matter."""
+    return np.where(np.nan_to_num(std) > 0, std, 1.0) ** -2.0
 
 
 def _linearise(padded: _Padded, pos_e: Floats) -> tuple[Floats, Floats, Floats]:
