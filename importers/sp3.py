@@ -69,10 +69,13 @@ def _epoch(line: str, scale: str, leap: LeapSeconds) -> int:
     words = line[1:].split()
     try:
         year, month, day, hour, minute = (int(word) for word in words[:5])
-        second_ns = round(float(words[5]) * 1e9)
+        second = float(words[5])
         start = int(np.datetime64(f"{year:04d}-{month:02d}-{day:02d}", "s").astype(np.int64))
     except (ValueError, IndexError, OverflowError):
         return 0
+    if not (1980 <= year < 2200 and 0 <= hour < 24 and 0 <= minute < 60 and 0 <= second < 61):
+        return 0
+    second_ns = round(second * 1e9)
     unix_ns = (start + hour * 3600 + minute * 60) * _S + second_ns
     if scale == "UTC":
         return int(gps_from_utc(np.array([unix_ns]), leap)[0])
