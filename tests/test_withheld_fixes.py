@@ -1,12 +1,13 @@
-"""Fixes kept from the filter: thinning and simulated outages."""
+"""Fixes and ranges kept from the filter: thinning and simulated outages."""
 
 import numpy as np
 import pytest
 
-from navreplay.time_scales import gps_from_week_tow
+from navreplay.time_scales import gps_from_week_tow, week_tow_from_gps
 from navreplay.timeline import FixStatus, GnssFixSeries, LogError
-from pipelines.outages import outage_windows, withhold_fixes
+from pipelines.outages import outage_windows, withhold_fixes, withhold_ranges
 from pipelines.sections import OutageSection
+from tests.range_samples import make_ranges
 
 WEEK, START = 2374, 243258.499
 
@@ -75,3 +76,32 @@ def test_withholding_everything_is_told():
     section = OutageSection(windows_gps_tow=((99.0, 105.0),), week=WEEK)
     with pytest.raises(LogError, match="withhold every fix"):
         withhold_fixes(fixes_at([100.0, 101.0]), section)
+
+
+def test_windows_withhold_ranges_but_for_the_satellites_kept():
+    ranges = make_ranges(10)
+    week, tow = week_tow_from_gps(ranges.t_ns[:1])
+    start = float(tow[0])
+    windows = ((start + 2, start + 5),)
+    inside = (ranges.t_ns > ranges.t_ns[0] + 2_000_000_000) & (ranges.t_ns <= ranges.t_ns[0] + 5_000_000_000)
+    bare = withhold_ranges(ranges, OutageSection(windows_gps_tow=windows, week=int(week[0])))
+    assert np.array_equal(bare.t_ns, ranges.t_ns[~inside])
+    two = withhold_ranges(ranges, OutageSection(windows_gps_tow=windows, satellites_kept=2))
+    assert len(two) == len(bare) + 2 * 3
+    assert len(np.unique(two.sat[(two.t_ns > windows[0][0]) & np.isin(two.t_ns, ranges.t_ns[inside])])) == 2
+    assert two.troposphere_removed
+
+
+def test_thinning_of_ranges_keeps_whole_epochs():
+    ranges = make_ranges(10)
+    assert np.array_equal(np.unique(withhold_ranges(ranges, OutageSection(fix_interval_s=3.0)).t_ns), ranges.t_ns[::33])
+    assert withhold_ranges(ranges, OutageSection()) is ranges
+
+
+def test_windows_without_ranges_or_that_leave_none_are_told():
+    ranges = make_ranges(3)
+    week, tow = week_tow_from_gps(ranges.t_ns[:1])
+    with pytest.raises(LogError, match="no range lies in the window"):
+        withhold_ranges(ranges, OutageSection(windows_gps_tow=((0.0, 1.0),), week=int(week[0]) + 1))
+    with pytest.raises(LogError, match="withhold every range"):
+        withhold_ranges(ranges, OutageSection(windows_gps_tow=((float(tow[0]) - 1, float(tow[0]) + 9),)))
