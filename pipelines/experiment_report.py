@@ -11,7 +11,7 @@ from navreplay.timeline import Floats, LogError
 from pipelines.experiment import QUANTITIES, Experiment, Outcome
 from pipelines.experiment_summary import WHOLE, summarise_experiment
 from pipelines.report import Report, dump_json
-from pipelines.report_figures import Plot, bend_of
+from pipelines.report_figures import Plot
 from pipelines.report_html import render_html
 from pipelines.report_markdown import render_markdown
 from pipelines.report_tables import Figure, Table, figure_text
@@ -163,7 +163,9 @@ def experiment_plots(experiment: Experiment, outcomes: Sequence[Outcome]) -> tup
     shades = tuple(window for stretch in experiment.stretches for window in stretch.windows)
     count = len(outcomes)
     errors = draw_time_panels(_error_panels(outcomes, styles), duration, shades)
-    plots = [Plot("Errors", f"Root mean square over {count} seeds of the 3-D errors; stretches shaded.", legend, errors)]
+    plots = [
+        Plot("Errors", f"Log10 of the root mean square over {count} seeds of the 3-D errors; stretches shaded.", legend, errors)
+    ]
     noise = _noise_panels(outcomes, styles, duration)
     if noise:
         note = f"Median over {_NOISE_BIN_S:g} s and all seeds of log10 of the variance used over the true one; 0 is right."
@@ -181,9 +183,8 @@ def _error_panels(outcomes: Sequence[Outcome], styles: dict[str, str]) -> list[P
             errors = [o.arms[label].errors[:, 3 * i : 3 * i + 3] * factor for o in outcomes if label in o.arms]
             if errors:
                 mean_square = np.mean([(error**2).sum(axis=1) for error in errors], axis=0)
-                layers.append(Layer("line", outcomes[0].t_s, np.sqrt(mean_square), style, label))
-        if layers:
-            panels.append(Panel(f"{quantity} [{unit}]", tuple(layers), bend_of(*(layer.y for layer in layers))))
+                layers.append(Layer("line", outcomes[0].t_s, np.log10(mean_square) / 2, style, label))
+        panels.append(Panel(f"log10 {quantity} [{unit}]", tuple(layers)))
     return panels
 
 

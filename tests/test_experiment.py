@@ -78,7 +78,7 @@ def made_outcome(seed: int, errors: dict[str, float], nees: float = 3.0) -> Outc
     arms = {}
     for label, error in errors.items():
         table = np.zeros((60, 9))
-        table[:, 0] = error
+        table[:, 0] = table[:, 3] = error
         table[:, 8] = np.radians(error)
         arms[label] = ArmOutcome(table, np.full((60, 3), nees), {"range": NoiseRatio(t_s, np.full(60, 1.05))})
     return Outcome(seed, t_s, arms, {}, dict.fromkeys(errors, 0.1))
