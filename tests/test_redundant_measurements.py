@@ -52,7 +52,7 @@ def run_adapter(name, noise, parameters=None, times=None, told=1.0, labels=LABEL
     return np.array(used)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [*NAMES, "ermakf-whitened"])
 def test_contract_on_a_running_filter(name):
     """R stays symmetric positive definite and what came in is not changed, with satellites that come and go."""
     adapter = build_method(name).adapter
@@ -155,6 +155,16 @@ def test_derived_beats_printed_on_correlated_noise_in_the_filter():
     assert ratio["srmakf"] < 0.07
     assert ratio["ermakf"] < 0.1
     assert 0.6 < ratio["ermakf-derived"] < 2
+
+
+def test_whitened_noise_has_the_density_of_the_correlated_one():
+    noise = 5 * gauss_markov(20, 3, 1000, seed=12).T
+    derived, whitened = (run_adapter(name, noise)[100:] for name in ("ermakf-derived", "ermakf-whitened"))
+    assert (whitened >= 0.999 * derived).all()
+    # (1 + rho) / (1 - rho) is 40 for 20 epochs, and between 3 and 20 epochs for most short windows
+    assert 10 < np.median(whitened) / 25 < 60
+    white = run_adapter("ermakf-whitened", gauss_markov(0, 3, 600, seed=5).T)[100:]
+    assert np.median(white) == pytest.approx(1, rel=0.15)
 
 
 def test_burg_finds_a_known_process():
