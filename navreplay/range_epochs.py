@@ -80,22 +80,19 @@ def arrange_ranges(ranges: RangeSeries, options: RangeOptions) -> tuple[RangeEpo
     starts = ranges.epoch_starts
     epoch = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
     system = ranges.sat.astype("U1")
-    known = np.unique(system).tolist()
-    wanted = np.isin(system, list(options.systems)) if options.systems else np.ones(len(ranges), dtype=np.bool_)
-    weak = wanted & (ranges.cn0 < options.cn0_mask)
+    weak = np.asarray(ranges.cn0 < options.cn0_mask)
     first = np.zeros(len(ranges), dtype=np.bool_)
-    candidates = np.flatnonzero(wanted & ~weak)
+    candidates = np.flatnonzero(~weak)
     _, satellite = np.unique(ranges.sat, return_inverse=True)
     _, place = np.unique(satellite[candidates] * len(starts) + epoch[candidates], return_index=True)
     first[candidates[place]] = True
     left_out = {
-        "of a system not wanted": int((~wanted).sum()),
         f"below {options.cn0_mask:g} dB-Hz": int(weak.sum()),
         "of a satellite already seen in the epoch": int(len(candidates) - first.sum()),
     }
     if not first.any():
         raise LogError(
-            f"ranges: none of {len(ranges)} rows is left, the log has systems {', '.join(known)}; check range.systems and "
+            f"ranges: all {len(ranges)} rows are weaker than {options.cn0_mask:g} dB-Hz; is the C/N0 in another unit? Lower "
             "range.cn0_mask_dbhz"
         )
     offsets = [_GPS_TIME.get(letter, letter) for letter in system.tolist()]

@@ -16,9 +16,6 @@ _DEG = pi / 180
 class RangeSection(Section):
     """Pseudoranges, range rates and the receiver clock."""
 
-    systems: Annotated[str, Field(pattern="^[GRECJIS]*$")] = Field(
-        "", description="systems to use, as RINEX letters such as 'GE'; empty: all"
-    )
     elevation_mask_deg: Annotated[float, Field(ge=0, lt=90)] = Field(10.0, description="lower satellites are not used [deg]")
     cn0_mask_dbhz: NotNegative = Field(30.0, description="weaker signals are not used [dB-Hz]")
     pseudorange_std_m: Positive = Field(
@@ -50,7 +47,6 @@ class RangeSection(Section):
             cn0_reference=self.cn0_reference_dbhz,
             elevation_mask=self.elevation_mask_deg * _DEG,
             cn0_mask=self.cn0_mask_dbhz,
-            systems=self.systems,
             ionosphere=self.ionosphere,
             troposphere=self.troposphere,
             clock_noise=self.clock_noise_m_rts,
