@@ -56,5 +56,5 @@ def decode_d1(number: NDArray[np.int64], words: NDArray[np.int64], near_ns: int)
     records["tgd"] = np.column_stack([one.scaled(78, 10, 0, 1e-10), one.scaled(88, 10, 0, 1e-10)])
     records["health"] = one.whole(38, 1)
     records["sat"] = [f"C{value:02d}" for value in number[sets[:, 0]]]
-    _, first = np.unique(records[["sat", "toe_ns", "af0", "m0"]], return_index=True)
-    return records[np.sort(first)], good
+    _, rows = np.unique(records[["sat", "toe_ns", "af0", "m0"]], return_index=True)
+    return records[np.sort(rows)], good

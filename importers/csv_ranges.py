@@ -1,6 +1,6 @@
 """Columns of a mapped table as pseudoranges: satellites, signals, and the corrections that columns hold."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -97,7 +97,7 @@ def _satellites(values: np.ndarray, mapping: CsvMapping) -> np.ndarray:
     return satellite_names(np.array([_name(str(text), blocks) for text in texts]))[inverse]
 
 
-def _name(text: str, blocks: list[tuple[int, str]]) -> str:
+def _name(text: str, blocks: Sequence[tuple[int, str]]) -> str:
     try:
         number = round(float(text))
     except (ValueError, OverflowError):

@@ -48,15 +48,15 @@ def decode_lnav(
         chosen = bits.rows(sets[:, column])
         for name, (first, width, exponent, factor, signed) in elements.items():
             records[name] = chosen.scaled(first, width, exponent, factor, signed)
-    first = bits.rows(sets[:, 0])
+    one = bits.rows(sets[:, 0])
     # Week numbers count modulo 1024: the sending time of subframe 1 is the one nearest to the log among them.
-    sent_ns = first.whole(48, 10) * _WEEK_NS + first.whole(24, 17) * _SIX_SECONDS_NS
+    sent_ns = one.whole(48, 10) * _WEEK_NS + one.whole(24, 17) * _SIX_SECONDS_NS
     cycle_ns = 1024 * _WEEK_NS
     sent_ns = sent_ns + np.rint((near_ns - sent_ns) / cycle_ns).astype(np.int64) * cycle_ns
-    records["toc_ns"] = nearest_time(first.whole(176, 16) * 16, sent_ns)
+    records["toc_ns"] = nearest_time(one.whole(176, 16) * 16, sent_ns)
     records["toe_ns"] = nearest_time(records["toe_sow"], sent_ns)
-    records["tgd"][:, 0] = first.scaled(160, 8, -31)
-    records["health"] = first.whole(64, 6)
+    records["tgd"][:, 0] = one.scaled(160, 8, -31)
+    records["health"] = one.whole(64, 6)
     records["sat"] = [f"{letter}{value:02d}" for value in number[sets[:, 0]]]
     return records, _klobuchar(bits.rows(ionosphere[-1:])), good
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from importers.ephemeris import GLONASS, KEPLER
 from importers.log import Table
-from importers.rinex_text import Lines, RinexText, exponent_numbers, plain_numbers, read_rinex
+from importers.rinex_text import Lines, RinexText, calendar_ns, exponent_numbers, read_rinex
 from navreplay.time_scales import GPS_EPOCH_UNIX_S, WEEK_S, LeapSeconds, gps_from_utc
 from navreplay.timeline import Floats, LogError, Times
 
@@ -16,6 +16,7 @@ __all__ = ["is_rinex_navigation", "read_rinex_navigation"]
 
 _S = 1_000_000_000
 _BDT_BEHIND_GPS_S = 14
+_CALENDAR = ((4, 4), (9, 2), (12, 2), (15, 2), (18, 2), (21, 2))
 _LARGEST_FLAGS = 4096
 _MESSAGES = ("LNAV", "INAV", "FNAV", "D1", "D2", "FDMA")
 _LINES = {"G": 8, "E": 8, "C": 8, "J": 8, "R": 4}
@@ -85,17 +86,8 @@ def _find_records(text: RinexText) -> tuple[NDArray[np.intp], NDArray[np.int64],
 
 def _epochs(lines: Lines, start: NDArray[np.intp]) -> Times:
     """Calendar times of the records, in nanoseconds since 1980-01-06 of whatever scale; 0 where there is none."""
-    parts = [
-        plain_numbers(lines.field(start, first, width)) for first, width in ((4, 4), (9, 2), (12, 2), (15, 2), (18, 2), (21, 2))
-    ]
-    year, month, day, hour, minute, second = parts
-    good = (year >= 1980) & (year < 2200) & (month >= 1) & (month <= 12) & (day >= 1) & (day <= 31)
-    good &= (hour >= 0) & (hour < 24) & (minute >= 0) & (minute < 60) & (second >= 0) & (second <= 60)
-    whole = [np.where(good, part, 1).astype(np.int64) for part in parts]
-    months = ((whole[0] - 1970) * 12 + whole[1] - 1).astype("datetime64[M]")
-    days = months.astype("datetime64[D]").astype(np.int64) + whole[2] - 1
-    seconds = days * 86400 + whole[3] * 3600 + whole[4] * 60 + whole[5] - GPS_EPOCH_UNIX_S
-    return np.where(good, seconds * _S, 0)
+    unix_ns, good = calendar_ns(lines, start, _CALENDAR)
+    return np.where(good, unix_ns - GPS_EPOCH_UNIX_S * _S, 0)
 
 
 def _value(lines: Lines, start: NDArray[np.intp], line: int, place: int) -> Floats:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from importers.log import Table
-from importers.rinex_text import Lines, RinexText, plain_numbers, read_rinex
+from importers.rinex_text import Lines, RinexText, calendar_ns, plain_numbers, read_rinex
 from importers.settings import RangeInput
 from importers.signals import DEFAULT_SIGNALS, SPEED_OF_LIGHT, carrier_hz
 from navreplay.time_scales import GPS_EPOCH_UNIX_S, LeapSeconds, gps_from_utc
@@ -24,6 +24,7 @@ _FIELD, _STRIDE = 14, 16
 _BDT_BEHIND_GPS_S = 14
 _MORE = 30
 """How many fields beyond those announced are looked for."""
+_CALENDAR = ((2, 4), (7, 2), (10, 2), (13, 2), (16, 2), (18, 11))
 _EVENTS = (2, 3, 4, 5, 6)
 
 
@@ -107,7 +108,7 @@ def _satellite_lines(text: RinexText, leap: LeapSeconds, rejected: Counter[str])
     body = body[epoch[body] >= 0]
     place = body - marks[epoch[body]]
     of_event = event[epoch[body]]
-    surplus = ~of_event & (place > np.nan_to_num(count[epoch[body]], nan=follow[epoch[body]]))
+    surplus = ~of_event & (place > np.where(np.isnan(count), follow, count)[epoch[body]])
     untimed = ~of_event & ~timed[epoch[body]] & ~surplus
     rejected["more satellites than the epoch announces"] += int(surplus.sum())
     rejected["epoch line damaged"] += int(untimed.sum())
@@ -117,15 +118,7 @@ def _satellite_lines(text: RinexText, leap: LeapSeconds, rejected: Counter[str])
 
 def _epoch_times(text: RinexText, marks: NDArray[np.intp], leap: LeapSeconds) -> tuple[Times, NDArray[np.bool_]]:
     """GPS time of the epochs, and whether each can be read."""
-    columns = ((2, 4), (7, 2), (10, 2), (13, 2), (16, 2), (18, 11))
-    year, month, day, hour, minute, second = (plain_numbers(text.lines.field(marks, *place)) for place in columns)
-    good = (year >= 1980) & (year < 2200) & (month >= 1) & (month <= 12) & (day >= 1) & (day <= 31)
-    good &= (hour >= 0) & (hour < 24) & (minute >= 0) & (minute < 60) & (second >= 0) & (second < 61)
-    year, month, day, hour, minute = (np.where(good, part, 1).astype(np.int64) for part in (year, month, day, hour, minute))
-    months = ((year - 1970) * 12 + month - 1).astype("datetime64[M]")
-    days = months.astype("datetime64[D]").astype(np.int64) + day - 1
-    fraction = np.rint(np.where(good, second, 0.0) * 1e7).astype(np.int64) * 100
-    unix_ns = (days * 86400 + hour * 3600 + minute * 60) * _S + fraction
+    unix_ns, good = calendar_ns(text.lines, marks, _CALENDAR)
     scale = next((content[48:51] for content, label in text.header if label == "TIME OF FIRST OBS"), "GPS")
     if scale == "GLO":
         return gps_from_utc(unix_ns, leap), good

@@ -3,6 +3,7 @@
 Source: RINEX 3.05 and 4.01 (IGS/RTCM).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,9 +11,9 @@ from numpy.typing import NDArray
 
 from importers.range_rows import satellite_names
 from importers.text_table import read_bytes
-from navreplay.timeline import Floats, LogError
+from navreplay.timeline import Floats, LogError, Times
 
-__all__ = ["Lines", "RinexText", "exponent_numbers", "plain_numbers", "read_rinex"]
+__all__ = ["Lines", "RinexText", "calendar_ns", "exponent_numbers", "plain_numbers", "read_rinex"]
 
 _NEWLINE, _SPACE, _ZERO, _NOT_ASCII = 10, 32, 48, 128
 _HEADER_END = b"END OF HEADER"
@@ -86,6 +87,23 @@ def _split(body: bytes) -> Lines:
     stop = np.concatenate([newlines, [len(buffer)]])
     filled = stop > start
     return Lines(buffer, start[filled].astype(np.int64), stop[filled].astype(np.int64))
+
+
+def calendar_ns(lines: Lines, rows: NDArray[np.intp], columns: Sequence[tuple[int, int]]) -> tuple[Times, NDArray[np.bool_]]:
+    """Nanoseconds since 1970 of the calendar dates in the lines rows (k,), exact to 100 ns, and whether each is one.
+
+    columns: first column and width of year, month, day, hour, minute and second.
+    """
+    parts = [plain_numbers(lines.field(rows, first, width)) for first, width in columns]
+    limits = ((1980, 2199), (1, 12), (1, 31), (0, 23), (0, 59), (0, 60.9999999))
+    good = np.ones(len(rows), dtype=bool)
+    for part, (least, most) in zip(parts, limits, strict=True):
+        good &= (part >= least) & (part <= most)
+    year, month, day, hour, minute = (np.where(good, part, 1.0).astype(np.int64) for part in parts[:5])
+    fraction_ns = np.rint(np.where(good, parts[5], 0.0) * 1e7).astype(np.int64) * 100
+    months = ((year - 1970) * 12 + month - 1).astype("datetime64[M]")
+    days = months.astype("datetime64[D]").astype(np.int64) + day - 1
+    return (days * 86400 + hour * 3600 + minute * 60) * 10**9 + fraction_ns, good
 
 
 def plain_numbers(chars: NDArray[np.uint8]) -> Floats:
