@@ -195,7 +195,7 @@ def _nearest(key: str) -> str | None:
     sections = {k.split(".")[0]: k.split(".")[0] for k in keys}
     anywhere = {k.rpartition(".")[2]: k for k in keys}
     for names in (siblings if section else sections, anywhere):
-        match = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+        match = difflib.get_close_matches(name.lower(), names, n=1, cutoff=0.5)
         if match:
             return names[match[0]]
     return None

@@ -167,6 +167,8 @@ def test_a_file_that_holds_no_windows_is_named(tmp_path):
 
 def test_a_mistake_on_the_command_line_is_told_as_such():
     assert error_of(None, "imu.grad=tactical").startswith("command line: unknown key 'imu.grad'")
+    unknown = error_of(None, "gnss.default_position_std_m.UNKNOWN=[1,2]")
+    assert "the nearest valid key is 'gnss.default_position_std_m.unknown'" in unknown
     assert "expected KEY=VALUE" in error_of(None, "imu.grade")
     assert "imu is a value, not a section" in error_of(None, "imu=1", "imu.grade=tactical")
 
