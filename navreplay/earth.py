@@ -67,6 +67,8 @@ def gravity(lat: ArrayLike, height: ArrayLike) -> Floats:
 def earth_rate_n(lat: ArrayLike) -> Floats:
     """Rotation of the Earth in NED [rad/s], (..., 3)."""
     lat = np.asarray(lat, dtype=np.float64)
+    if lat.ndim == 0:
+        return np.array([EARTH_RATE * np.cos(lat), 0.0, -EARTH_RATE * np.sin(lat)])
     return np.stack([EARTH_RATE * np.cos(lat), np.zeros_like(lat), -EARTH_RATE * np.sin(lat)], axis=-1)
 
 
@@ -85,6 +87,8 @@ def ecef_from_lla(lla: Floats) -> Floats:
     _, normal = radii(lat)
     across = (normal + height) * np.cos(lat)
     up = (normal * (1 - ECCENTRICITY_SQUARED) + height) * np.sin(lat)
+    if lat.ndim == 0:
+        return np.array([across * np.cos(lon), across * np.sin(lon), up])
     return np.stack([across * np.cos(lon), across * np.sin(lon), up], axis=-1)
 
 
@@ -136,6 +140,9 @@ def move_lla(lla: Floats, offset_n: Floats) -> Floats:
     lla = np.asarray(lla, dtype=np.float64)
     meridian, normal = radii(lla[..., 0])
     height = lla[..., 2]
+    if lla.ndim == 1:
+        metres = np.array([1 / (meridian + height), 1 / ((normal + height) * np.cos(lla[0])), -1.0])
+        return np.asarray(lla + metres * offset_n)
     scale = np.stack([1 / (meridian + height), 1 / ((normal + height) * np.cos(lla[..., 0])), -np.ones_like(height)], axis=-1)
     return np.asarray(lla + scale * offset_n)
 

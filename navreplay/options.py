@@ -102,11 +102,11 @@ class RangeOptions:
     [m/s], those of a strong signal from the zenith, times sqrt(1 + 10^((cn0_reference - C/N0) / 10)) / sin(elevation): its
     variance doubles at cn0_reference [dB-Hz] (SIGMA-epsilon model, Hartinger and Brunner, GPS Solutions 2(4) (1999) 35).
     pseudorange_std_floor, range_rate_std_floor: least ones believed.
-    Not used: satellites below elevation_mask [rad] and signals below cn0_mask [dB-Hz]. ionosphere, troposphere: correct for them
-    what is not yet corrected. clock_noise [m/sqrt(s)] and clock_drift_walk [m/s/sqrt(s)]: white noise of the receiver clock's
-    frequency, and its random walk. system_offset_std [m]: of another constellation's clock offset against the first's, before
-    it is seen; system_offset_walk [m/sqrt(s)]: its random walk. clock_jump [m]: a common jump of all pseudoranges beyond it is
-    the clock's.
+    Not used: satellites below elevation_mask [rad] and signals below cn0_mask [dB-Hz]. ionosphere, troposphere: correct for
+    them what is not yet corrected. clock_noise [m/sqrt(s)] and clock_drift_walk [m/s/sqrt(s)]: white noise of the receiver
+    clock's frequency, and its random walk. system_offset_std [m]: of another constellation's clock offset against the first's,
+    before it is seen; system_offset_walk [m/sqrt(s)]: its random walk. clock_jump [m]: a common jump of all pseudoranges beyond
+    it is the clock's.
     """
 
     pseudorange_std: float = 1.0
