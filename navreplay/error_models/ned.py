@@ -5,6 +5,7 @@ states the sign of each element.
 """
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -185,8 +186,7 @@ class NedErrorModel:
             steps.dvel[part],
             steps.bridged[part],
             ends - first,
-            self.density(),
-            self.correlation_time(),
+            *_driving_noise(self),
             interval,
             out.states,
             out.covariances,
@@ -195,3 +195,9 @@ class NedErrorModel:
             out.noises,
         )
         return out
+
+
+@cache
+def _driving_noise(model: NedErrorModel) -> tuple[Floats, Floats]:
+    """Densities and correlation times, which every epoch asks for."""
+    return model.density(), model.correlation_time()
