@@ -119,7 +119,7 @@ class RangeOptions:
     ionosphere: bool = True
     troposphere: bool = True
     clock_noise: float = 0.1
-    clock_drift_walk: float = 0.2
+    clock_drift_walk: float = 0.5
     system_offset_std: float = 300.0
     system_offset_walk: float = 0.01
     clock_jump: float = 150.0

@@ -30,7 +30,9 @@ class RangeSection(Section):
     ionosphere: bool = Field(True, description="correct by the broadcast model what is not corrected yet")
     troposphere: bool = Field(True, description="correct by a standard atmosphere what is not corrected yet")
     clock_noise_m_rts: Positive = Field(0.1, description="white noise of the receiver clock's frequency [m/sqrt(s)]")
-    clock_drift_walk_mps_rts: Positive = Field(0.2, description="random walk of its frequency [m/s/sqrt(s)]")
+    clock_drift_walk_mps_rts: Positive = Field(
+        0.5, description="random walk of its frequency: a TCXO that is shaken; 0.2 at rest [m/s/sqrt(s)]"
+    )
     system_offset_std_m: Positive = Field(
         300.0, description="clock offset of another system against the first, before it is seen [m]"
     )

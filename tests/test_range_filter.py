@@ -30,7 +30,9 @@ def log() -> synthetic_logs.SyntheticLog:
 
 def options(**changes) -> FilterOptions:
     alignment = AlignmentOptions(course_std=np.radians(0.3))
-    return replace(FilterOptions(imu_noise=SCENARIO.imu.noise, alignment=alignment, output_rate=1.0), **changes)
+    ranges = RangeOptions(clock_drift_walk=SCENARIO.receiver.clock.frequency_walk)
+    plain = FilterOptions(imu_noise=SCENARIO.imu.noise, alignment=alignment, output_rate=1.0, ranges=ranges)
+    return replace(plain, **changes)
 
 
 def select(ranges: RangeSeries, keep: np.ndarray) -> RangeSeries:
