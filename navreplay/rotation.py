@@ -4,6 +4,7 @@ Euler angles are roll, pitch, yaw: body to navigation is Rz(yaw) Ry(pitch) Rx(ro
 (2006); Markley and Crassidis, Fundamentals of Spacecraft Attitude Determination and Control (2014), chapter 2.
 """
 
+from math import cos, hypot, sin
 from typing import Any
 
 import numpy as np
@@ -67,6 +68,11 @@ def quat_conjugate(q: Floats) -> Floats:
 def quat_from_rotvec(rotvec: Floats) -> Floats:
     """Unit quaternion (..., 4) of rotation vectors (..., 3) [rad]."""
     rotvec = np.asarray(rotvec, dtype=np.float64)
+    if rotvec.ndim == 1:
+        x, y, z = rotvec.tolist()
+        half = hypot(x, y, z) / 2
+        scale = sin(half) / half / 2 if half > 0 else 0.5
+        return np.array([cos(half), scale * x, scale * y, scale * z])
     angle = np.linalg.norm(rotvec, axis=-1, keepdims=True)
     vector = 0.5 * np.sinc(angle / (2 * np.pi)) * rotvec
     return np.concatenate([np.cos(angle / 2), vector], axis=-1)
