@@ -41,6 +41,7 @@ def gnss_comm_ranges(table: Table) -> Table:
     """``GnssMeasMsg``: a row per satellite and frequency."""
 
     def columns(observations: list[Any], message: np.ndarray) -> dict[str, np.ndarray]:
+        """Columns of all observations; message (k,): the index of the message each came in."""
         counts = [len(item.psr) for item in observations]
         sat = np.repeat(_satellites(np.array([item.sat for item in observations], dtype=np.int64)), counts)
         weeks = np.array([item.time.week for item in observations], dtype=np.int64)
@@ -69,6 +70,7 @@ def ublox_ranges(table: Table) -> Table:
     times = gps_from_week_tow(weeks, tow)
 
     def columns(blocks: list[Any], message: np.ndarray) -> dict[str, np.ndarray]:
+        """Columns of all measurement blocks; message (k,): the index of the message each came in."""
         rows = np.zeros(len(blocks), RAWX_BLOCK)
         names = list(getattr(type(blocks[0]), "__dataclass_fields__", ())) if blocks else []
         for name in names:

@@ -49,6 +49,7 @@ def _own(table: Table) -> Table:
         applied |= np.where(_true(table.columns.get(name), n), int(meaning), 0)
 
     def columns(satellites: list[Any], message: np.ndarray) -> dict[str, np.ndarray]:
+        """Columns of all satellites; message (k,): the index of the message each came in."""
         out: dict[str, np.ndarray] = {"t_gps_ns": t_ns[message], "applied": applied[message]}
         out["sat"] = satellite_names(np.array([str(sat.get("sat", "")) for sat in satellites], dtype="U8"))
         out["signal"] = np.array([str(sat.get("signal", "")) for sat in satellites], dtype="U2")

@@ -71,6 +71,7 @@ def _columns(selection: Selection) -> dict[str, np.ndarray]:
     unknown = np.full(n, np.nan)
 
     def values(name: str) -> np.ndarray:
+        """The column of that name (n,), NaN where the file has none."""
         return columns.get(name, unknown).astype(np.float64)
 
     sat, signal = _satellites(columns["SignalType"], columns["Svid"])

@@ -308,6 +308,37 @@ def _add_noise(p, density, span, bridge):
 
 
 @njit(cache=True)
+def _move_covariance(phi, decay, density, span, bridge, p, work):
+    """p <- F p F' + noise of span [s] in place, half of the noise before and half after the transition (trapezoidal rule)."""
+    _add_noise(p, density, span / 2, bridge / 2)
+    _sandwich(phi, decay, p, work)
+    _add_noise(p, density, span / 2, bridge / 2)
+
+
+@njit(cache=True)
+def _accumulate(h, c_start, c_end, dv_n, body, c_dt, f_dt, c_theta, c_dvel):
+    """Adds a step of h [s] to the integrals that the error dynamics need: of C_nb, of specific force in n, and of C_nb times
+    the body's rate and specific force, axis by axis."""
+    for i in range(3):
+        f_dt[i] += dv_n[i]
+        for j in range(3):
+            c_mean = 0.5 * (c_start[i, j] + c_end[i, j])
+            c_dt[i, j] += c_mean * h
+            c_theta[i, j] += c_mean * body[j]
+            c_dvel[i, j] += c_mean * body[3 + j]
+
+
+@njit(cache=True)
+def _fade(x, h, tau, n):
+    """Lets the sensor errors in x decay over h [s], tau (n - 9) being their correlation times."""
+    for i in range(6):
+        x[10 + i] *= math.exp(-h / tau[i])
+    if n == 18 or n == 24:
+        for i in range(3):
+            x[22 + i] *= math.exp(-h / tau[n - 12 + i])
+
+
+@njit(cache=True)
 def _multiply_left(phi, decay, total, work):
     """total (n, c) <- F total in place, F = [phi; diag(decay)]; c at most n."""
     n, c = total.shape
@@ -346,9 +377,8 @@ def propagate(
     start (w), p_start (n, n): at the beginning; cross_start (n, c): covariance with c states that do not move. dt, dtheta,
     dvel, bridged: steps. ends (k): number of steps up to and with each node, the first counted from 0; nodes share no
     step. density (n): white-noise densities. tau (n - 9): correlation times of the sensor errors, inf for random walks.
-    interval [s]: longest covariance step; noise enters half before and half after the transition (trapezoidal rule). Filled:
-    states (k, w), covariances (k, n, n), crosses (k, n, c) and, unless they have no rows, transitions and noises (k, n, n) of
-    the node's whole interval.
+    interval [s]: longest covariance step. Filled: states (k, w), covariances (k, n, n), crosses (k, n, c) and, unless they have
+    no rows, transitions and noises (k, n, n) of the node's whole interval.
     """
     n = p_start.shape[0]
     x = start.copy()
@@ -368,36 +398,23 @@ def propagate(
     f_dt = np.zeros(3)
     keep = transitions.shape[0] > 0
     fading = np.isfinite(tau).any()
+    identity = np.eye(n)
     total_phi = np.eye(n)
     total_q = np.zeros((n, n))
     step = 0
     _fill_matrix(x[6], x[7], x[8], x[9], c)
     for node in range(ends.shape[0]):
-        if keep:
-            total_phi[:, :] = 0
-            for i in range(n):
-                total_phi[i, i] = 1
-            total_q[:, :] = 0
+        total_phi[:, :] = identity
+        total_q[:, :] = 0
         span = 0.0
         bridge = 0.0
         while step < ends[node]:
             h = dt[step]
             c_start[:, :] = c
             _step(x, h, dtheta[step], dvel[step], c, dv_n, body)
-            for i in range(3):
-                f_dt[i] += dv_n[i]
-                for j in range(3):
-                    c_mean = 0.5 * (c_start[i, j] + c[i, j])
-                    c_dt[i, j] += c_mean * h
-                    if n >= 21:
-                        c_theta[i, j] += c_mean * body[j]
-                        c_dvel[i, j] += c_mean * body[3 + j]
+            _accumulate(h, c_start, c, dv_n, body, c_dt, f_dt, c_theta, c_dvel)
             if fading:
-                for i in range(6):
-                    x[10 + i] *= math.exp(-h / tau[i])
-                if n == 18 or n == 24:
-                    for i in range(3):
-                        x[22 + i] *= math.exp(-h / tau[n - 12 + i])
+                _fade(x, h, tau, n)
             if bridged[step]:
                 bridge += h * h
             span += h
@@ -408,16 +425,12 @@ def propagate(
             _fill_transition(a, phi)
             for i in range(n - 9):
                 decay[i] = math.exp(-span / tau[i])
-            _add_noise(p, density, span / 2, bridge / 2)
-            _sandwich(phi, decay, p, work)
-            _add_noise(p, density, span / 2, bridge / 2)
+            _move_covariance(phi, decay, density, span, bridge, p, work)
             if cross.shape[1] > 0:
                 _multiply_left(phi, decay, cross, work)
             if keep:
                 _multiply_left(phi, decay, total_phi, work)
-                _add_noise(total_q, density, span / 2, bridge / 2)
-                _sandwich(phi, decay, total_q, work)
-                _add_noise(total_q, density, span / 2, bridge / 2)
+                _move_covariance(phi, decay, density, span, bridge, total_q, work)
             span = 0.0
             bridge = 0.0
             c_dt[:, :] = 0

@@ -20,7 +20,6 @@ __all__ = [
     "gps_from_utc",
     "gps_from_week_tow",
     "load_leap_seconds",
-    "tai_from_gps",
     "utc_from_gps",
     "week_tow_from_gps",
 ]
@@ -117,11 +116,6 @@ def utc_from_gps(t_ns: Times, table: LeapSeconds = LEAP_SECONDS) -> Times:
 def gps_from_tai(tai_ns: Times) -> Times:
     """GPS nanoseconds (n,) from TAI nanoseconds since 1970-01-01 (n,)."""
     return np.asarray(tai_ns, dtype=np.int64) - (_TAI_MINUS_GPS_S + GPS_EPOCH_UNIX_S) * _S
-
-
-def tai_from_gps(t_ns: Times) -> Times:
-    """TAI nanoseconds since 1970-01-01 (n,) from GPS nanoseconds (n,)."""
-    return np.asarray(t_ns, dtype=np.int64) + (_TAI_MINUS_GPS_S + GPS_EPOCH_UNIX_S) * _S
 
 
 def gps_from_week_tow(week: np.ndarray | int, tow_s: np.ndarray) -> Times:

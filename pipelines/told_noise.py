@@ -75,6 +75,7 @@ def _tell_ranges(
         t_s = (ranges.t_ns - log.scenario.journey.start_ns) / 1e9
 
         def figure(name: str) -> Floats:
+            """A figure of the surroundings (n,) at the times of the ranges."""
             return figure_at(receiver.surroundings, name, t_s)
 
         grown = _whitened(receiver.multipath_time, 1 / log.scenario.journey.gnss_rate) - 1

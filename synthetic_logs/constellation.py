@@ -135,6 +135,7 @@ def _arrange_shell(shell: _Shell, reference_ns: int) -> Orbits:
     plane, slot = np.divmod(np.arange(m), m // shell.planes)
 
     def scattered(mean: float, std: float) -> Floats:
+        """A normal draw (m,) per satellite."""
         return mean + std * rng.standard_normal(m)
 
     perigee = rng.uniform(-pi, pi, m)

@@ -63,6 +63,7 @@ def draw_range_errors(receiver: Receiver, sights: Sights, reception: Reception, 
     """Errors of all sights (k rows) at the epochs t_s (n,) [s from the start of the log]."""
 
     def figure(name: str) -> Floats:
+        """A figure of the surroundings (k,) at each sight."""
         return figure_at(receiver.surroundings, name, t_s)[sights.epoch]
 
     growth = noise_growth(reception.cn0) * _window_scale(receiver.noise_windows, t_s)[sights.epoch]

@@ -79,6 +79,7 @@ def receive(receiver: Receiver, sights: Sights, course: Floats, t_s: Floats, dra
     places = receiver.surroundings
 
     def figure(name: str) -> Floats:
+        """A figure of the surroundings (k,) at each sight."""
         return figure_at(places, name, t_s)[sights.epoch]
 
     blocked = is_blocked(sights.azimuth, sights.elevation, course[sights.epoch], figure("roof_elevation"))

@@ -72,6 +72,7 @@ class MaximumLikelihood:
         unit = 1 / np.sqrt(np.maximum(misfit(start, stack)[2], _LEAST_CURVATURE))
 
         def objective(x: Floats) -> tuple[float, Floats]:
+            """Misfit and gradient (m,) in variables scaled to unit curvature."""
             value, gradient, _ = misfit(x * unit, stack)
             return value, gradient * unit
 

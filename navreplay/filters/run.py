@@ -61,6 +61,7 @@ def _report_of(t_ns: Times, progress: Progress | None) -> Callable[[int], None]:
     begin, span = int(t_ns[0]), max(int(t_ns[-1] - t_ns[0]), 1)
 
     def report(now_ns: int) -> None:
+        """Tells the share of the span done by now_ns."""
         if progress is not None:
             progress((now_ns - begin) / span)
 

@@ -109,6 +109,7 @@ def _ephemeris_lines(issue: Orbits, row: int, system: str) -> Iterator[str]:
     """The record of one satellite (RINEX 3.04, tables A6, A8, A14)."""
 
     def numbers(*values: float) -> str:
+        """Fields D19.12."""
         return "".join(f"{value:19.12E}" for value in values)
 
     time_ns = issue.reference_ns - AHEAD_S[system] * _S
