@@ -1,16 +1,63 @@
-"""Moment rules: how the moments of a prediction are formed from those of the state."""
+"""Moment rules: how the moments of a prediction are formed from those of the state, and what a measurement does to them."""
 
 from dataclasses import dataclass
+from typing import Protocol
 
-from navreplay.filters.core import Gaussian, Innovation
+import numpy as np
+
+from navreplay.error_models.error_model import ErrorModel
+from navreplay.error_models.ned import Propagated
+from navreplay.filters.core import Gaussian, Innovation, condition
 from navreplay.measurements import Measurement
+from navreplay.strapdown import NavState, Steps
+from navreplay.timeline import Floats
 
-__all__ = ["Linearised"]
+__all__ = ["Linearised", "MomentRule"]
+
+
+class MomentRule(Protocol):
+    """What the epoch loop asks of a moment rule."""
+
+    def propagate(
+        self,
+        model: ErrorModel,
+        state: NavState,
+        cov: Floats,
+        steps: Steps,
+        first: int,
+        ends: np.ndarray,
+        interval: float,
+        keep: bool = False,
+    ) -> Propagated:
+        """From state and cov (n, n) before step `first` to the nodes behind ends (k,) steps (see `ErrorModel.propagate`)."""
+        ...
+
+    def innovate(self, prior: Gaussian, measurement: Measurement) -> Innovation:
+        """Innovation of a measurement whose residual was formed at the nominal state, against the prior error of mean (n,)."""
+        ...
+
+    def condition(self, prior: Gaussian, innovation: Innovation, noise: Floats) -> Gaussian:
+        """Posterior with R = noise (m, m)."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
 class Linearised:
     """First order (extended Kalman filter): moments through the Jacobian at the nominal state."""
+
+    def propagate(
+        self,
+        model: ErrorModel,
+        state: NavState,
+        cov: Floats,
+        steps: Steps,
+        first: int,
+        ends: np.ndarray,
+        interval: float,
+        keep: bool = False,
+    ) -> Propagated:
+        """From state and cov (n, n) before step `first` to the nodes behind ends (k,) steps, by the model's transition."""
+        return model.propagate(state, cov, steps, first, ends, interval, keep)
 
     def innovate(self, prior: Gaussian, measurement: Measurement) -> Innovation:
         """Innovation of a measurement whose residual was formed at the nominal state, against the prior error of mean (n,)."""
@@ -18,3 +65,7 @@ class Linearised:
         labels = tuple(f"{kind} {label}" for kind, label in zip(measurement.kinds, measurement.labels, strict=True))
         residual = measurement.residual - measurement.jacobian @ prior.mean
         return Innovation(residual, cross, measurement.jacobian @ cross, measurement.noise, labels)
+
+    def condition(self, prior: Gaussian, innovation: Innovation, noise: Floats) -> Gaussian:
+        """Posterior with R = noise (m, m), by the optimal gain."""
+        return condition(prior, innovation, noise)

@@ -23,7 +23,7 @@ from navreplay.adapt.srmakf import Srmakf
 from navreplay.adapt.strong_tracking import StrongTracking
 from navreplay.adapt.student_t import StudentT
 from navreplay.adapt.variational_bayes import VariationalBayes
-from navreplay.filters.moments import Linearised
+from navreplay.filters.moments import Linearised, MomentRule
 from navreplay.timeline import LogError
 
 __all__ = ["PRESETS", "Method", "Preset", "build_method"]
@@ -34,22 +34,36 @@ class Method:
     """What the epoch loop runs. name: of the preset."""
 
     name: str
-    rule: Linearised
+    rule: MomentRule
     adapter: NoiseAdapter[Any]
 
 
 @dataclass(frozen=True, slots=True)
 class Preset:
-    """name, one line of description, and the adapter's type, whose fields are the parameters."""
+    """name, one line of description, and the types of adapter and moment rule, whose fields are the parameters."""
 
     name: str
     description: str
     adapter: Callable[..., NoiseAdapter[Any]]
+    rule: Callable[..., MomentRule] = Linearised
 
     @property
     def parameters(self) -> dict[str, Any]:
         """Names and defaults of the parameters."""
-        return {field.name: field.default for field in fields(self.adapter)}  # type: ignore[arg-type]
+        return _defaults(self.adapter) | _defaults(self.rule)
+
+    def build(self, parameters: Mapping[str, object]) -> Method:
+        """The method with parameters, all of them known, replaced."""
+        rule, adapter = (_share_of(part, parameters) for part in (self.rule, self.adapter))
+        return Method(self.name, self.rule(**rule), self.adapter(**adapter))
+
+
+def _defaults(part: Callable[..., Any]) -> dict[str, Any]:
+    return {field.name: field.default for field in fields(part)}  # type: ignore[arg-type]
+
+
+def _share_of(part: Callable[..., Any], parameters: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: parameters[name] for name in _defaults(part) if name in parameters}
 
 
 PRESETS: dict[str, Preset] = {
@@ -91,7 +105,7 @@ def build_method(name: str, parameters: Mapping[str, object] | None = None) -> M
         if key not in defaults:
             raise LogError(f"filter '{name}': there is no parameter '{key}'; {_suggest(key, list(defaults))}")
         _check_number(name, key, value, defaults[key])
-    return Method(name, Linearised(), preset.adapter(**(parameters or {})))
+    return preset.build(parameters or {})
 
 
 def _suggest(wrong: str, known: list[str]) -> str:

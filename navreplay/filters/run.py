@@ -14,7 +14,7 @@ from navreplay.filters.range_gate import RangeGate
 from navreplay.filters.record import Recorder
 from navreplay.filters.rows import Rows
 from navreplay.filters.stretches import cut_at_gaps, tell_unreached
-from navreplay.filters.update import Updater
+from navreplay.filters.update import Estimator, Updater
 from navreplay.heading import Sources
 from navreplay.options import FilterOptions
 from navreplay.solution import Solution
@@ -124,22 +124,22 @@ def _run_stretch(
         recorder.tell(start.t_ns, "warning", warning)
     state, cov = aiding.start(start)
     gate = Gate(options.gate) if isinstance(aiding, FixAiding) else RangeGate(options.gate)
-    updater = Updater(aiding, gate, aiding.model, method, recorder)
+    estimator = Updater(aiding, gate, aiding.model, method, recorder)
     epochs = np.flatnonzero((aiding.t_ns > start.t_ns) & (aiding.t_ns <= imu.t_ns[-1]))
     nodes = np.union1d(aiding.t_ns[epochs], _output_times(start.t_ns, int(imu.t_ns[-1]), options.output_rate))
     steps = make_steps(imu, np.append(nodes, start.t_ns)).after(start.t_ns)
-    return _run_epochs(steps, nodes, aiding.t_ns, epochs, state, cov, updater, aiding.model, options, report)
+    return _run_epochs(steps, nodes, aiding.t_ns, epochs, state, cov, estimator, aiding.model, options, report)
 
 
 def _run_alone(
     aiding: RangeAiding, method: Method, options: FilterOptions, recorder: Recorder, report: Callable[[int], None]
 ) -> Rows:
     start_ns, state, cov = aiding.start_alone()
-    updater = Updater(aiding, RangeGate(options.gate), aiding.model, method, recorder)
+    estimator = Updater(aiding, RangeGate(options.gate), aiding.model, method, recorder)
     epochs = np.flatnonzero(aiding.t_ns > start_ns)
     nodes = np.union1d(aiding.t_ns[epochs], _output_times(start_ns, int(aiding.t_ns[-1]), options.output_rate))
     return _run_epochs(
-        idle_steps(start_ns, nodes), nodes, aiding.t_ns, epochs, state, cov, updater, aiding.model, options, report
+        idle_steps(start_ns, nodes), nodes, aiding.t_ns, epochs, state, cov, estimator, aiding.model, options, report
     )
 
 
@@ -150,7 +150,7 @@ def _run_epochs(
     epochs: np.ndarray,
     state: NavState,
     cov: Floats,
-    updater: Updater,
+    estimator: Estimator,
     model: ErrorModel,
     options: FilterOptions,
     report: Callable[[int], None],
@@ -165,12 +165,12 @@ def _run_epochs(
     for epoch, stop in zip([*epochs.tolist(), None], [*stops, len(nodes)], strict=True):
         if stop > node:
             interval, keep = options.covariance_interval, options.smooth
-            moved = model.propagate(state, cov, steps, step, ends[node:stop], interval, keep)
+            moved = estimator.propagate(state, cov, steps, step, ends[node:stop], interval, keep)
             rows.put(slice(node + 1, stop + 1), moved)
             state, cov = NavState.unpack(moved.states[-1]), moved.covariances[-1]
             node, step = stop, int(ends[stop - 1])
         if epoch is not None:
-            updated = updater.update(epoch, state, cov, steps.dtheta[step - 1], float(steps.dt[step - 1]))
+            updated = estimator.update(epoch, state, cov, steps.dtheta[step - 1], float(steps.dt[step - 1]))
             rows.correct(node, updated)
             state, cov = updated.state, updated.cov
             report(int(t_ns[epoch]))

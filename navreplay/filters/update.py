@@ -5,15 +5,16 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from navreplay.error_models.error_model import ErrorModel
-from navreplay.filters.core import Gaussian, Innovation, Leftover, condition
+from navreplay.error_models.ned import Propagated
+from navreplay.filters.core import Gaussian, Innovation, Leftover
 from navreplay.filters.presets import Method
 from navreplay.filters.record import Recorder
 from navreplay.measurements import Measurement
 from navreplay.solution import RowStatus
-from navreplay.strapdown import NavState
+from navreplay.strapdown import NavState, Steps
 from navreplay.timeline import Floats, Times
 
-__all__ = ["Aiding", "EpochGate", "Observed", "Updated", "Updater", "Verdict"]
+__all__ = ["Aiding", "EpochGate", "Estimator", "Observed", "Updated", "Updater", "Verdict"]
 
 
 class Observed(NamedTuple):
@@ -84,8 +85,22 @@ class Aiding(Protocol):
         ...
 
 
+class Estimator(Protocol):
+    """What the epoch loop drives: state and covariance (n, n) go through it, and what else it carries it keeps."""
+
+    def propagate(
+        self, state: NavState, cov: Floats, steps: Steps, first: int, ends: np.ndarray, interval: float, keep: bool = False
+    ) -> Propagated:
+        """From state and cov before step `first` to the nodes behind ends (k,) steps (see `ErrorModel.propagate`)."""
+        ...
+
+    def update(self, epoch: int, state: NavState, cov: Floats, dtheta: Floats, dt: float) -> Updated:
+        """The epoch of that index, from state and cov; dtheta (3,) [rad] and dt [s] are those of the step before it."""
+        ...
+
+
 class Updater:
-    """Updates by one kind of aiding. Keeps the state of the adapter, the gate, and the record."""
+    """The single filter, with one kind of aiding. Keeps the state of the adapter, the gate, and the record."""
 
     def __init__(self, aiding: Aiding, gate: EpochGate, model: ErrorModel, method: Method, recorder: Recorder) -> None:
         self._aiding = aiding
@@ -96,6 +111,12 @@ class Updater:
         self._adapter_state: Any = method.adapter.init()
         self._leftover: Leftover | None = None
         self._zero = np.zeros(model.size)
+
+    def propagate(
+        self, state: NavState, cov: Floats, steps: Steps, first: int, ends: np.ndarray, interval: float, keep: bool = False
+    ) -> Propagated:
+        """From state and cov (n, n) before step `first` to the nodes behind ends (k,) steps, by the moment rule."""
+        return self._method.rule.propagate(self._model, state, cov, steps, first, ends, interval, keep)
 
     def update(self, epoch: int, state: NavState, cov: Floats, dtheta: Floats, dt: float) -> Updated:
         """The epoch of that index, from state and cov (n, n); dtheta (3,) [rad] and dt [s] are those of the step before it."""
@@ -126,7 +147,7 @@ class Updater:
         if len(verdict.passed) < len(noise):
             innovation = innovation.select(verdict.passed)
             noise = noise[verdict.passed[:, None], verdict.passed]
-        posterior = condition(adapted, innovation, noise)
+        posterior = rule.condition(adapted, innovation, noise)
         self._leave(t_ns, labels, measurement.residual - measurement.jacobian @ posterior.mean)
         moved = self._model.retract(state, posterior.mean)
         return Updated(moved, posterior.cov, state, adapted.cov, RowStatus.UPDATED)
