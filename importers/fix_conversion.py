@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from importers.rows import NO_FIX, Rows
+from importers.rows import NO_FIX, Frame, Rows
 from importers.screening import Screening
 from importers.settings import FixInput
 from importers.sources import Joined, account
@@ -62,11 +62,12 @@ def screen_positions(screening: Screening, rows: Rows, min_rank: int = 0) -> Non
 
 def convert_fixes(
     position: Joined | None, velocity: Joined | None, settings: FixInput
-) -> tuple[GnssFixSeries, tuple[ChannelUse, ...], tuple[str, ...]]:
-    """The series, its accounting, and what was assumed; velocities of another channel join the fix within a millisecond, or
-    become rows of their own. Raises LogError where no row is usable."""
+) -> tuple[GnssFixSeries, tuple[ChannelUse, ...], tuple[str, ...], dict[str, str]]:
+    """The series, its accounting, what was assumed, and the settings recognised; velocities of another channel join the fix
+    within a millisecond, or become rows of their own. Raises LogError where no row is usable."""
     uses: list[ChannelUse] = []
     notes: list[str] = []
+    recognised: dict[str, str] = {}
     parts: list[GnssFixSeries] = []
     for joined in (position, velocity):
         if joined is None:
@@ -76,16 +77,18 @@ def convert_fixes(
         order = screening.order(joined.t_ns)
         if len(order) == 0 and joined is position:
             raise LogError(f"{joined.name}: none of its {len(joined.t_ns)} fixes is usable: {screening.rejected(slice(None))}")
-        series, told = _build(joined, order, settings, parts[0] if parts else None)
+        series, told, frame = _build(joined, order, settings, parts[0] if parts else None)
         notes += [*joined.notes, *screening.notes, *told]
         if series is None:
             uses += [_unused(use) for use in account(joined, screening)]
         else:
             parts.append(series)
+            if frame is not None and settings.velocity_frame == "auto":
+                recognised["input.fix.velocity_frame"] = frame
             uses += account(joined, screening)
     if not parts:
         raise LogError("neither positions nor velocities of a GNSS receiver are usable")
-    return (parts[0] if len(parts) == 1 else _merge(*parts)), tuple(uses), tuple(notes)
+    return (parts[0] if len(parts) == 1 else _merge(*parts)), tuple(uses), tuple(notes), recognised
 
 
 def _unused(use: ChannelUse) -> ChannelUse:
@@ -94,8 +97,8 @@ def _unused(use: ChannelUse) -> ChannelUse:
 
 def _build(
     joined: Joined, order: np.ndarray, settings: FixInput, positions: GnssFixSeries | None
-) -> tuple[GnssFixSeries | None, tuple[str, ...]]:
-    """One channel as a series; None where its velocities are in no frame that can be recognised."""
+) -> tuple[GnssFixSeries | None, tuple[str, ...], Frame | None]:
+    """One channel as a series, what was assumed, and the frame of its velocities; no series where that cannot be recognised."""
     rows, n = joined.rows, len(order)
     t_ns = joined.t_ns[order]
     lla = np.full((n, 3), np.nan) if rows.lla is None else rows.lla[order]
@@ -105,7 +108,7 @@ def _build(
         notes.append(f"{joined.name}: {settings.geoid_separation_m:g} m were added to its heights above mean sea level")
     cov_pos, told = clean_covariance(f"{joined.name} position", None if rows.cov_pos is None else rows.cov_pos[order], n)
     notes += told
-    vel, cov_vel = np.full((n, 3), np.nan), None
+    vel, cov_vel, found = np.full((n, 3), np.nan), None, None
     if rows.vel is not None:
         path = (
             (t_ns, lla)
@@ -118,12 +121,12 @@ def _build(
         if turned is None:
             if settings.velocity_channel is not None:
                 raise LogError(f"{joined.name}: {_FOREIGN}; set input.fix.velocity_frame, or leave the channel out")
-            return None, (f"{joined.name}: {_FOREIGN}, so it is not used",)
-        vel, cov_vel, told = turned
+            return None, (f"{joined.name}: {_FOREIGN}, so it is not used",), None
+        vel, cov_vel, found, told = turned
         notes += told
     cov_vel, told = clean_covariance(f"{joined.name} velocity", cov_vel, n)
     status = np.zeros(n, dtype=np.int8) if rows.status is None else rows.status[order].astype(np.int8)
-    return (GnssFixSeries(t_ns, lla, vel, cov_pos, cov_vel, status) if n else None), (*notes, *told)
+    return (GnssFixSeries(t_ns, lla, vel, cov_pos, cov_vel, status) if n else None), (*notes, *told), found
 
 
 _FOREIGN = "its velocities agree with the motion of the fixes in neither ENU nor NED (a vehicle-frame velocity?)"

@@ -12,6 +12,7 @@ from navreplay.timeline import ChannelUse, Floats, ImuSeries, LogError
 __all__ = ["axes_matrix", "convert_imu"]
 
 _STANDARD_GRAVITY = 9.80665
+_FACTORS = {"rad/s": 1.0, "deg/s": np.pi / 180, "m/s2": 1.0, "g": _STANDARD_GRAVITY}
 _BEYOND_ANY_SENSOR = 1e6
 _G_RANGE = (0.5, 1.5)
 _DEGREES_MEDIAN = 1.0
@@ -26,8 +27,10 @@ def axes_matrix(axes: str, mounting_deg: tuple[float, float, float] = (0.0, 0.0,
     return np.asarray(matrix_from_euler(*np.radians(mounting_deg)) @ relabelled)
 
 
-def convert_imu(joined: Joined, settings: ImuInput) -> tuple[ImuSeries, tuple[ChannelUse, ...], tuple[str, ...]]:
-    """The series, its accounting, and what was assumed. Raises LogError where no sample is usable."""
+def convert_imu(
+    joined: Joined, settings: ImuInput
+) -> tuple[ImuSeries, tuple[ChannelUse, ...], tuple[str, ...], dict[str, str]]:
+    """The series, its accounting, what was assumed, and the settings recognised. Raises LogError where no sample is usable."""
     rows = joined.rows
     if rows.gyro is None or rows.accel is None:
         raise LogError(f"{joined.name}: has no angular rates or no specific forces, so it cannot serve as IMU")
@@ -38,7 +41,7 @@ def convert_imu(joined: Joined, settings: ImuInput) -> tuple[ImuSeries, tuple[Ch
     order = screening.order(joined.t_ns)
     if len(order) == 0:
         raise LogError(f"{joined.name}: none of its {len(joined.t_ns)} samples is usable: {screening.rejected(slice(None))}")
-    gyro_factor, accel_factor, notes = _find_units(joined.name, rows, order, settings)
+    gyro_unit, accel_unit, notes = _find_units(joined.name, rows, order, settings)
     axes = rows.sensor_axes if settings.axes == "auto" else settings.axes
     turn = axes_matrix(axes, settings.mounting_deg)
     if axes != "frd" or any(settings.mounting_deg):
@@ -48,11 +51,13 @@ def convert_imu(joined: Joined, settings: ImuInput) -> tuple[ImuSeries, tuple[Ch
         notes.append(f"{joined.name}: its axes are taken as forward, right, down")
     series = ImuSeries(
         joined.t_ns[order],
-        _turn(rows.gyro[order] * gyro_factor, turn),
-        _turn(rows.accel[order] * accel_factor, turn),
+        _turn(rows.gyro[order] * _FACTORS[gyro_unit], turn),
+        _turn(rows.accel[order] * _FACTORS[accel_unit], turn),
         settings.increments or rows.means,
     )
-    return series, account(joined, screening), (*joined.notes, *screening.notes, *notes)
+    found = {"axes": axes, "gyro_unit": gyro_unit, "accel_unit": accel_unit}
+    recognised = {f"input.imu.{key}": value for key, value in found.items() if getattr(settings, key) == "auto"}
+    return series, account(joined, screening), (*joined.notes, *screening.notes, *notes), recognised
 
 
 def _turn(vectors: Floats, matrix: Floats) -> Floats:
@@ -63,8 +68,8 @@ def _turn(vectors: Floats, matrix: Floats) -> Floats:
     return np.asarray(vectors @ matrix.T)
 
 
-def _find_units(name: str, rows: Rows, order: np.ndarray, settings: ImuInput) -> tuple[float, float, list[str]]:
-    """Factors to rad/s and m/s^2, and sentences on what was recognised."""
+def _find_units(name: str, rows: Rows, order: np.ndarray, settings: ImuInput) -> tuple[str, str, list[str]]:
+    """Units of angular rate and specific force, and sentences on what was recognised."""
     assert rows.gyro is not None
     assert rows.accel is not None
     notes = []
@@ -84,8 +89,4 @@ def _find_units(name: str, rows: Rows, order: np.ndarray, settings: ImuInput) ->
             notes.append(
                 f"{name}: its angular rate has a median of {middle:.2f} and a peak of {peak:.1f}, so it is taken as deg/s"
             )
-    return (
-        np.pi / 180 if gyro_unit == "deg/s" else 1.0,
-        _STANDARD_GRAVITY if accel_unit == "g" else 1.0,
-        notes,
-    )
+    return gyro_unit, accel_unit, notes

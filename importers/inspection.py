@@ -51,13 +51,15 @@ class ChannelInfo:
 @dataclass(frozen=True, slots=True)
 class Inspection:
     """What some logs hold. candidates: by role, the channels among which a setting has to choose, where that is open.
-    assumptions: sentences on what was assumed or converted."""
+    assumptions: sentences on what was assumed or converted. recognised: what was taken for settings that were not made, by
+    their keys."""
 
     files: tuple[SourceFile, ...]
     channels: tuple[ChannelInfo, ...]
     findings: tuple[Finding, ...]
     candidates: Mapping[str, tuple[str, ...]]
     assumptions: tuple[str, ...]
+    recognised: tuple[tuple[str, str], ...]
 
 
 def inspect_logs(
@@ -81,15 +83,16 @@ def inspect_logs(
     findings += [Finding("warning", "damaged", f"{log.path}: {note}", "") for log in everything for note in log.notes]
     usable = [choice for choice in chosen if (id(choice.log), choice.channel.name) in tables]
     assumptions: tuple[str, ...] = ()
+    recognised: tuple[tuple[str, str], ...] = ()
     try:
         timeline = build_timeline(everything, usable, tables, settings)
     except LogError as error:
         findings.append(Finding("error", "unusable", f"{error}.", ""))
     else:
-        assumptions = timeline.provenance.assumptions
+        assumptions, recognised = timeline.provenance.assumptions, timeline.provenance.recognised
         findings += [finding for finding in preflight(timeline) if finding.code not in _implied(open_choices)]
     files = tuple(describe_file(log) for log in everything)
-    return Inspection(files, channels, tuple(findings), open_choices, assumptions)
+    return Inspection(files, channels, tuple(findings), open_choices, assumptions, recognised)
 
 
 def _implied(open_choices: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:

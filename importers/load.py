@@ -67,14 +67,15 @@ def build_timeline(
     clock = Clock(leap_seconds(settings.leap_seconds), tuple(source.table for source in sources.get("time", [])))
     uses: list[ChannelUse] = [_time_use(source) for source in sources.get("time", [])]
     notes: list[str] = []
+    recognised: dict[str, str] = {}
     imu = fixes = ranges = attitude = trajectory = None
     if "imu" in sources:
-        imu, told, assumed = convert_imu(join_sources(sources["imu"], settings.imu, clock), settings.imu)
-        uses, notes = [*uses, *told], [*notes, *assumed]
+        imu, told, assumed, found = convert_imu(join_sources(sources["imu"], settings.imu, clock), settings.imu)
+        uses, notes, recognised = [*uses, *told], [*notes, *assumed], recognised | found
     if "fix" in sources or "velocity" in sources:
         position, velocity = (join_sources(sources[role], settings.fix, clock) if role in sources else None for role in _GNSS)
-        fixes, told, assumed = convert_fixes(position, velocity, settings.fix)
-        uses, notes = [*uses, *told], [*notes, *assumed]
+        fixes, told, assumed, found = convert_fixes(position, velocity, settings.fix)
+        uses, notes, recognised = [*uses, *told], [*notes, *assumed], recognised | found
     if "range" in sources:
         ranges, told, assumed = _ranges(sources, settings, clock)
         uses, notes = [*uses, *told], [*notes, *assumed]
@@ -92,7 +93,7 @@ def build_timeline(
         notes.append("the fixes themselves, before any is withheld, serve as the reference: not an independent one")
     files = tuple(describe_file(log) for log in {log.path: log for log in logs}.values())
     damage = tuple(f"{log.path}: {note}" for log in logs for note in log.notes)
-    provenance = Provenance(files, _complete(logs, uses), tuple(dict.fromkeys(notes)), damage)
+    provenance = Provenance(files, _complete(logs, uses), tuple(dict.fromkeys(notes)), damage, tuple(recognised.items()))
     return Timeline(
         imu=imu,
         fixes=fixes,

@@ -36,7 +36,7 @@ def convert_reference(joined: Joined, settings: ReferenceInput) -> tuple[Traject
     if rows.vel is not None:
         turned = turn_velocities(joined.name, t_ns, rows.vel[order], None, rows.vel_frame, t_ns, lla)
         vel = vel if turned is None else turned[0]
-        notes += () if turned is None else turned[2]
+        notes += () if turned is None else turned[3]
     q_nb = np.full((len(order), 4), np.nan) if rows.q is None else _attitude(rows, settings.convention)[order]
     cov, told = clean_covariance(joined.name, None if rows.cov_pos is None else rows.cov_pos[order], len(order))
     return Trajectory(t_ns, lla, vel, q_nb, cov), account(joined, screening), (*notes, *screening.notes, *told)

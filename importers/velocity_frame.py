@@ -23,8 +23,9 @@ def interpolate_lla(t_ns: Times, path_t_ns: Times, path_lla: Floats) -> Floats:
 
 def turn_velocities(
     name: str, t_ns: Times, vel: Floats, cov: Floats | None, frame: Frame, path_t_ns: Times, path_lla: Floats
-) -> tuple[Floats, Floats | None, tuple[str, ...]] | None:
-    """Velocities (n, 3) and covariances (n, 3, 3) in NED, and what was assumed; None where the frame cannot be recognised."""
+) -> tuple[Floats, Floats | None, Frame, tuple[str, ...]] | None:
+    """Velocities (n, 3) and covariances (n, 3, 3) in NED, the frame they were in, and what was assumed; None where it cannot
+    be recognised."""
     notes: tuple[str, ...] = ()
     known = np.isfinite(path_lla).all(axis=1)
     path_t_ns, path_lla = path_t_ns[known], path_lla[known]
@@ -34,7 +35,7 @@ def turn_velocities(
             return None
         frame, notes = found, (note,)
     if frame == "ned":
-        return vel, cov, notes
+        return vel, cov, frame, notes
     if frame == "enu":
         turn = np.broadcast_to(_NED_OF_ENU, (len(vel), 3, 3))
     else:
@@ -43,7 +44,7 @@ def turn_velocities(
         lla = interpolate_lla(t_ns, path_t_ns, path_lla)
         turn = np.swapaxes(matrix_en(lla[:, 0], lla[:, 1]), 1, 2)
     turned = np.einsum("nij,nj->ni", turn, vel)
-    return turned, None if cov is None else turn @ cov @ np.swapaxes(turn, 1, 2), notes
+    return turned, None if cov is None else turn @ cov @ np.swapaxes(turn, 1, 2), frame, notes
 
 
 def _recognise(name: str, t_ns: Times, vel: Floats, path_t_ns: Times, path_lla: Floats) -> tuple[Frame | None, str]:

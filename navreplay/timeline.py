@@ -294,12 +294,13 @@ class ChannelUse:
 @dataclass(frozen=True, slots=True)
 class Provenance:
     """Where a timeline came from: files, channels, and in plain sentences what was assumed or converted on the way and what
-    damage the files have."""
+    damage the files have. recognised: of what was not set, what it was taken as, by the key that sets it."""
 
     files: tuple[SourceFile, ...] = ()
     channels: tuple[ChannelUse, ...] = ()
     assumptions: tuple[str, ...] = ()
     damage: tuple[str, ...] = ()
+    recognised: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True, eq=False, slots=True, kw_only=True)

@@ -150,7 +150,10 @@ def test_inspect_shows_channels_and_use(log, capsys):
 def test_init_writes_a_configuration_that_runs(folder, log):
     path = folder / "drive.toml"
     assert cli.main(["init", str(log), "-o", str(path)]) == 0
-    assert load_config(path).input.imu.channel is not None
+    found = load_config(path).input
+    assert found.imu.channel is not None
+    assert (found.imu.axes, found.imu.gyro_unit, found.imu.accel_unit) == ("flu", "rad/s", "m/s2")
+    assert found.fix.velocity_frame in ("enu", "ned")
     assert cli.main(["run", str(log), "-c", str(path), "-o", str(folder / "init"), "--quiet"]) == 0
 
 

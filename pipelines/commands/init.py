@@ -17,7 +17,7 @@ def run(arguments: argparse.Namespace) -> None:
     """Writes the configuration. Raises LogError for logs that cannot be opened or a file that cannot be written."""
     check_file(arguments.out, arguments.force)
     inspection = inspect_logs(arguments.logs, read_config(arguments).input)
-    config = load_config(arguments.config, [*_channel_sets(inspection), *arguments.sets])
+    config = load_config(arguments.config, [*_found(inspection), *arguments.sets])
     text = commented_template(config, _notes(inspection))
     try:
         arguments.out.parent.mkdir(parents=True, exist_ok=True)
@@ -28,10 +28,10 @@ def run(arguments: argparse.Namespace) -> None:
     print(f"{arguments.out}: edit it, then: navreplay run {logs} -c {arguments.out} -o OUT")
 
 
-def _channel_sets(inspection: Inspection) -> list[str]:
-    """Settings that name the channels found."""
-    names = {channel.role: channel.name for channel in inspection.channels if channel.role in SETTING}
-    return [f'{SETTING[role]}="{name}"' for role, name in names.items()]
+def _found(inspection: Inspection) -> list[str]:
+    """Settings that name the channels found, and what was recognised of them."""
+    channels = {SETTING[channel.role]: channel.name for channel in inspection.channels if channel.role in SETTING}
+    return [f'{key}="{value}"' for key, value in (channels | dict(inspection.recognised)).items()]
 
 
 def _notes(inspection: Inspection) -> list[str]:
