@@ -5,19 +5,20 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
-from time import perf_counter
+from time import process_time
 
 import numpy as np
 
-from navreplay.filters.presets import build_method
+from navreplay.filters.presets import Method, build_method
 from navreplay.filters.run import run_filter
 from navreplay.metrics import evaluate
 from navreplay.options import FilterOptions
 from navreplay.solution import Solution
 from navreplay.timeline import Floats, LogError, Times, Trajectory
-from pipelines.told_noise import Knowledge, NoiseRatio, compare_noise, tell
+from pipelines.restarted import Restarted
+from pipelines.told_noise import Knowledge, NoiseRatio, StartErrors, compare_noise, displace_start, tell
 from synthetic_logs.simulation import Scenario, SyntheticLog, simulate
 
 __all__ = [
@@ -29,6 +30,7 @@ __all__ = [
     "OrderClaim",
     "Outcome",
     "Published",
+    "PublishedNoise",
     "Stretch",
     "run_experiment",
     "run_seed",
@@ -39,12 +41,14 @@ QUANTITIES = ("position", "velocity", "attitude")
 
 @dataclass(frozen=True, slots=True)
 class Arm:
-    """One line of an experiment's tables. method: a preset, with parameters. told: what of the true noise it knows."""
+    """One line of an experiment's tables. method: a preset, with parameters. told: what of the true noise it knows. restarts:
+    times in seconds from the start of the log at which its adapter forgets all it has seen."""
 
     label: str
     method: str
     parameters: Mapping[str, object] = field(default_factory=dict)
     told: Knowledge = "log"
+    restarts: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +67,17 @@ class Published:
     source: str
     stretch: str
     quantity: str
+    figures: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class PublishedNoise:
+    """A row of a paper's table of R: the mean variance that an arm used in a stretch, by component (``position north``) in SI
+    units. source: where in the paper."""
+
+    source: str
+    stretch: str
+    arm: str
     figures: Mapping[str, float]
 
 
@@ -93,7 +108,8 @@ class NoiseClaim:
 @dataclass(frozen=True, slots=True)
 class Experiment:
     """Everything that decides an experiment but the seeds. description is one line, paper names the source. arms: the first is
-    the reference of paired differences. drawn: labels of up to six arms that the plots show. notes: readings, choices."""
+    the reference of paired differences. drawn: labels of up to six arms that the plots show. start: errors that every filter
+    starts with, beside those of the alignment in options; None: those of the first fix. notes: readings, choices."""
 
     name: str
     description: str
@@ -106,23 +122,27 @@ class Experiment:
     published: tuple[Published, ...] = ()
     orders: tuple[OrderClaim, ...] = ()
     noise_claims: tuple[NoiseClaim, ...] = ()
+    published_noise: tuple[PublishedNoise, ...] = ()
+    start: StartErrors | None = None
     notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ArmOutcome:
     """One arm on one seed. errors (k, 9): position NED [m], velocity NED [m/s] and rotation vector NED [rad], estimated minus
-    true. nees (k, 3): of the three. Both NaN where the solution does not reach. noise: by kind of measurement."""
+    true. nees (k, 3): of the three. Both NaN where the solution does not reach. noise: by kind of measurement. epochs: with a
+    measurement."""
 
     errors: Floats
     nees: Floats
     noise: Mapping[str, NoiseRatio]
+    epochs: int
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Outcome:
     """All arms on one seed, at times t_s (k,) from the start of the log. failures: by arm, why it gave no solution. seconds: by
-    arm, what filtering took."""
+    arm, the CPU time of filtering."""
 
     seed: int
     t_s: Floats
@@ -172,15 +192,26 @@ def run_seed(experiment: Experiment, seed: int) -> Outcome:
     t_ns = _judged_epochs(log)
     arms, failures, seconds = {}, {}, {}
     for arm in experiment.arms:
-        begin = perf_counter()
+        timeline, method = tell(log, arm.told), _build(arm, log)
+        if experiment.start is not None:
+            timeline = displace_start(timeline, log, experiment.start)
+        begin = process_time()
         try:
-            solution = run_filter(tell(log, arm.told), build_method(arm.method, arm.parameters), experiment.options)
+            solution = run_filter(timeline, method, experiment.options)
         except LogError as error:
             failures[arm.label] = str(error)
             continue
-        seconds[arm.label] = perf_counter() - begin
+        seconds[arm.label] = process_time() - begin
         arms[arm.label] = _judge(solution, log, t_ns)
     return Outcome(seed, (t_ns - log.scenario.journey.start_ns) / 1e9, arms, failures, seconds)
+
+
+def _build(arm: Arm, log: SyntheticLog) -> Method:
+    method = build_method(arm.method, arm.parameters)
+    if not arm.restarts:
+        return method
+    start_ns = log.scenario.journey.start_ns
+    return replace(method, adapter=Restarted(method.adapter, tuple(start_ns + round(t_s * 1e9) for t_s in arm.restarts)))
 
 
 def _judged_epochs(log: SyntheticLog) -> Times:
@@ -199,4 +230,5 @@ def _judge(solution: Solution, log: SyntheticLog, t_ns: Times) -> ArmOutcome:
     for i, quantity in enumerate(QUANTITIES):
         errors[at, 3 * i : 3 * i + 3] = evaluation.errors[quantity].error
         nees[at, i] = evaluation.errors[quantity].nees
-    return ArmOutcome(errors, nees, compare_noise(solution.innovations, log))
+    epochs = len(np.unique(np.concatenate([np.empty(0, np.int64), *(series.t_ns for series in solution.innovations)])))
+    return ArmOutcome(errors, nees, compare_noise(solution.innovations, log), epochs)

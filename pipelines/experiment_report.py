@@ -9,7 +9,7 @@ import numpy as np
 
 from navreplay.timeline import Floats, LogError
 from pipelines.experiment import QUANTITIES, Experiment, Outcome
-from pipelines.experiment_summary import WHOLE, summarise_experiment
+from pipelines.experiment_summary import SETTLED, WHOLE, summarise_experiment
 from pipelines.report import Report, dump_json
 from pipelines.report_figures import Plot
 from pipelines.report_html import render_html
@@ -68,6 +68,8 @@ def experiment_tables(report: Report) -> tuple[Table, ...]:
         *(_error_table(report, quantity, stretches) for quantity in QUANTITIES),
         _order_table(report),
         _noise_table(report, stretches),
+        *(_mean_noise_table(report, stretch) for stretch in report["stretches"]),
+        _settling_table(report),
         *(_nees_table(report, quantity, stretches) for quantity in QUANTITIES),
         _arm_table(report),
         Table("Notes", ("",), tuple((text,) for text in report["notes"])),
@@ -125,6 +127,45 @@ def _noise_table(report: Report, stretches: Sequence[str]) -> Table:
     return Table("R used over R true", ("", "", *stretches), rows, note)
 
 
+def _mean_noise_table(report: Report, stretch: str) -> Table:
+    """Means by component, beside the true and the published ones; without rows where components come and go."""
+    means = {label: arm["stretches"][stretch]["noise_used"] for label, arm in report["arms"].items()}
+    components = list(dict.fromkeys(name for figures in means.values() for name in figures))
+    if not components:
+        return Table("", (), ())
+    true = next(figures for figures in means.values() if figures)
+    rows = [("true", *(figure_text(true[name]["true"]) for name in components))]
+    for label, figures in means.items():
+        rows.append((label, *(figure_text(figures.get(name, {}).get("used")) for name in components)))
+    for row in report["published_noise"]:
+        if row["stretch"] == stretch:
+            texts = (figure_text(row["figures"].get(name)) for name in components)
+            rows.append((f"published for {row['arm']} ({row['source']})", *texts))
+    note = "Mean over epochs and seeds of the variance used, in m^2 and (m/s)^2."
+    return Table(f"Mean R used in '{stretch}'", ("", *components), tuple(rows), note)
+
+
+def _settling_table(report: Report) -> Table:
+    stretches = tuple(report["stretches"])
+    kinds = dict.fromkeys(
+        k for arm in report["arms"].values() for s in stretches for k in arm["stretches"][s]["noise_settled_s"]
+    )
+    rows = tuple(
+        (
+            kind.replace("_", " "),
+            label,
+            *(figure_text(arm["stretches"][stretch]["noise_settled_s"].get(kind)) for stretch in stretches),
+        )
+        for kind in kinds
+        for label, arm in report["arms"].items()
+    )
+    note = (
+        f"Median over seeds of the time from the start of the stretch until R used is first within a factor of {SETTLED:g} of "
+        "the true one; – where it is not."
+    )
+    return Table("Time until R is found [s]", ("", "", *stretches), rows, note)
+
+
 def _nees_table(report: Report, quantity: str, stretches: Sequence[str]) -> Table:
     rows = []
     for label, arm in report["arms"].items():
@@ -147,12 +188,12 @@ def _arm_table(report: Report) -> Table:
             arm["method"],
             ", ".join(f"{key} = {value}" for key, value in arm["parameters"].items()),
             told[arm["told"]],
-            figure_text(arm["seconds"]),
+            figure_text(arm["cpu_ms_per_epoch"]),
             str(len(arm["failures"])),
         )
         for label, arm in report["arms"].items()
     )
-    return Table("Methods", ("", "method", "parameters", "told of the noise", "seconds", "seeds failed"), rows)
+    return Table("Methods", ("", "method", "parameters", "told of the noise", "CPU ms per epoch", "seeds failed"), rows)
 
 
 def experiment_plots(experiment: Experiment, outcomes: Sequence[Outcome]) -> tuple[Plot, ...]:

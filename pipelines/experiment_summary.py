@@ -11,12 +11,14 @@ from navreplay.timeline import Floats
 from pipelines.experiment import QUANTITIES, ArmOutcome, Experiment, OrderClaim, Outcome, Stretch
 from pipelines.report import Report, plain_data
 
-__all__ = ["WHOLE", "published_orders", "rmse_figures", "stretch_rows", "summarise_experiment"]
+__all__ = ["SETTLED", "WHOLE", "published_orders", "rmse_figures", "stretch_rows", "summarise_experiment"]
 
 WHOLE = Stretch("whole drive", ((0.0, float("inf")),))
 _AXES = {"position": ("north", "east", "down"), "velocity": ("north", "east", "down"), "attitude": ("north", "east", "heading")}
 _UNITS = {"position": "m", "velocity": "m/s", "attitude": "deg"}
 _SCHEMA = "navreplay experiment 1"
+SETTLED = 1.5
+"""Factor within which R counts as found."""
 
 
 def stretch_rows(stretch: Stretch, t_s: Floats) -> np.ndarray:
@@ -57,13 +59,16 @@ def summarise_experiment(experiment: Experiment, outcomes: Sequence[Outcome]) ->
             "parameters": dict(arm.parameters),
             "told": arm.told,
             "failures": {str(o.seed): o.failures[arm.label] for o in outcomes if arm.label in o.failures},
-            "seconds": float(np.mean([o.seconds[arm.label] for o in outcomes if arm.label in o.seconds] or [np.nan])),
+            "cpu_ms_per_epoch": _cpu_ms_per_epoch(arm.label, outcomes),
+            "restarts": arm.restarts,
             "stretches": {
                 stretch.name: {
                     "rmse": _intervals(figures[arm.label][stretch.name]),
                     f"rmse_minus_{first}": _differences(figures[arm.label][stretch.name], figures[first][stretch.name]),
                     "nees": _consistency(arm.label, stretch, outcomes),
                     "noise_ratio": _noise_ratios(arm.label, stretch, outcomes),
+                    "noise_used": _noise_means(arm.label, stretch, outcomes),
+                    "noise_settled_s": _settling_times(arm.label, stretch, outcomes),
                 }
                 for stretch in stretches
             },
@@ -98,6 +103,10 @@ def summarise_experiment(experiment: Experiment, outcomes: Sequence[Outcome]) ->
             "published": [
                 {"source": p.source, "stretch": p.stretch, "quantity": p.quantity, "figures": dict(p.figures)}
                 for p in experiment.published
+            ],
+            "published_noise": [
+                {"source": p.source, "stretch": p.stretch, "arm": p.arm, "figures": dict(p.figures)}
+                for p in experiment.published_noise
             ],
             "orders": orders,
             "explanations": explanations,
@@ -166,6 +175,41 @@ def _noise_ratios(label: str, stretch: Stretch, outcomes: Sequence[Outcome]) -> 
             gathered.setdefault(kind, []).append(noise.ratio[stretch_rows(stretch, noise.t_s)])
     joined = {kind: np.concatenate(parts) for kind, parts in gathered.items()}
     return {kind: float(np.median(ratios)) for kind, ratios in joined.items() if len(ratios)}
+
+
+def _noise_means(label: str, stretch: Stretch, outcomes: Sequence[Outcome]) -> dict[str, dict[str, float]]:
+    """By component (``position north``): mean over epochs and seeds of the variance used, and of the true one."""
+    gathered: dict[str, list[Floats]] = {}
+    for _, arm in _arms_of(label, outcomes):
+        for kind, noise in arm.noise.items():
+            rows = stretch_rows(stretch, noise.t_s)
+            for j, name in enumerate(noise.labels):
+                used, ratio = (a[rows].reshape(-1, len(noise.labels))[:, j] for a in (noise.used, noise.ratio))
+                if len(used):
+                    gathered.setdefault(f"{kind} {name}", []).append(np.array([used.mean(), (used / ratio).mean()]))
+    means = {name: np.mean(figures, axis=0) for name, figures in gathered.items()}
+    return {name: {"used": float(used), "true": float(true)} for name, (used, true) in means.items()}
+
+
+def _settling_times(label: str, stretch: Stretch, outcomes: Sequence[Outcome]) -> dict[str, float]:
+    """By kind: median over seeds of the time [s] from the start of the stretch until R used is first within a factor of
+    SETTLED of the true one (geometric mean over an epoch's components); infinite where it is not."""
+    start, end = stretch.windows[0]
+    gathered: dict[str, list[float]] = {}
+    for _, arm in _arms_of(label, outcomes):
+        for kind, noise in arm.noise.items():
+            rows = (noise.t_s >= start) & (noise.t_s < end)
+            t_s, inverse = np.unique(noise.t_s[rows], return_inverse=True)
+            mean = np.bincount(inverse, np.log(noise.ratio[rows])) / np.bincount(inverse)
+            settled = t_s[np.abs(mean) < np.log(SETTLED)]
+            gathered.setdefault(kind, []).append(float(settled[0] - start) if len(settled) else np.inf)
+    return {kind: float(np.median(times)) for kind, times in gathered.items()}
+
+
+def _cpu_ms_per_epoch(label: str, outcomes: Sequence[Outcome]) -> float:
+    """Median over seeds of the CPU time of filtering, propagation included, per measurement epoch."""
+    costs = [1e3 * outcome.seconds[label] / max(arm.epochs, 1) for outcome, arm in _arms_of(label, outcomes)]
+    return float(np.median(costs or [np.nan]))
 
 
 def published_orders(experiment: Experiment) -> tuple[OrderClaim, ...]:

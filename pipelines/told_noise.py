@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from navreplay.earth import move_lla
 from navreplay.solution import InnovationSeries
 from navreplay.timeline import Floats, GnssFixSeries, RangeSeries, Timeline
 from synthetic_logs.gnss import FixErrors, GnssErrors
@@ -14,7 +15,7 @@ from synthetic_logs.receiver import Receiver
 from synthetic_logs.simulation import SyntheticLog
 from synthetic_logs.surroundings import figure_at
 
-__all__ = ["Knowledge", "NoiseRatio", "compare_noise", "tell"]
+__all__ = ["Knowledge", "NoiseRatio", "StartErrors", "compare_noise", "displace_start", "tell"]
 
 Knowledge = Literal["log", "moments", "model"]
 """log: what the log tells. moments: the true mean and variance at every time (the moment oracle). model (the clairvoyant): also
@@ -25,10 +26,22 @@ can make of the true coloured-noise model."""
 
 @dataclass(frozen=True, eq=False, slots=True)
 class NoiseRatio:
-    """Per measurement of one kind: t_s (r,) from the start of the log, and ratio (r,) of the variance used to the true one."""
+    """Per measurement of one kind: t_s (r,) from the start of the log, used (r,) the variance used, and its ratio (r,) to the
+    true one. labels: of the m components that come in turn, m of them per epoch; empty where epochs differ in them."""
 
     t_s: Floats
+    used: Floats
     ratio: Floats
+    labels: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class StartErrors:
+    """Errors NED, estimated minus true, of the position [m] and velocity [m/s] that a filter starts with; it is told their
+    magnitudes as standard deviations."""
+
+    position: tuple[float, float, float]
+    velocity: tuple[float, float, float]
 
 
 def tell(log: SyntheticLog, knowledge: Knowledge) -> Timeline:
@@ -43,6 +56,18 @@ def tell(log: SyntheticLog, knowledge: Knowledge) -> Timeline:
     if log.ranges is not None and log.range_truth is not None and log.scenario.receiver is not None:
         timeline = replace(timeline, ranges=_tell_ranges(log, log.ranges, log.range_truth, log.scenario.receiver, clairvoyant))
     return timeline
+
+
+def displace_start(timeline: Timeline, log: SyntheticLog, errors: StartErrors) -> Timeline:
+    """The timeline of a log with fixes whose first fix, from which a filter starts, has those errors instead of its own."""
+    if timeline.fixes is None or log.fix_errors is None:
+        raise ValueError("initial errors are put into the first fix, but the scenario has no fixes")
+    fixes, true = timeline.fixes, log.fix_errors.antenna
+    lla, vel_n, cov_pos, cov_vel = (a.copy() for a in (fixes.lla, fixes.vel_n, fixes.cov_pos, fixes.cov_vel))
+    lla[0] = move_lla(true.lla[0], np.array(errors.position))
+    vel_n[0] = true.vel_n[0] + errors.velocity
+    cov_pos[0], cov_vel[0] = np.diag(np.square(errors.position)), np.diag(np.square(errors.velocity))
+    return replace(timeline, fixes=replace(fixes, lla=lla, vel_n=vel_n, cov_pos=cov_pos, cov_vel=cov_vel))
 
 
 def _whitened(time_constant: float, interval: float) -> float:
@@ -100,9 +125,11 @@ def compare_noise(innovations: Sequence[InnovationSeries], log: SyntheticLog) ->
     for series in innovations:
         names = [(label,) for label in series.sources] if series.sources else [series.labels] * len(series.t_ns)
         true = [[truths[series.kind][t, name] for name in row] for t, row in zip(series.t_ns.tolist(), names, strict=True)]
-        ratio = series.noise_std**2 / np.array(true)
+        used = series.noise_std**2
+        ratio = used / np.array(true)
         t_s = (np.repeat(series.t_ns, ratio.shape[1]) - log.scenario.journey.start_ns) / 1e9
-        compared[series.kind] = NoiseRatio(t_s, ratio.ravel())
+        labels = () if series.sources else series.labels
+        compared[series.kind] = NoiseRatio(t_s, used.ravel(), ratio.ravel(), labels)
     return compared
 
 

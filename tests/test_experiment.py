@@ -7,13 +7,17 @@ import numpy as np
 import pytest
 
 import synthetic_logs
+from navreplay import earth
+from navreplay.adapt.iae import Iae
+from navreplay.filters.core import Gaussian, Innovation
 from navreplay.timeline import LogError
 from pipelines.cli import main
 from pipelines.experiment import Arm, ArmOutcome, NoiseClaim, Outcome, Published, Stretch, run_experiment, run_seed
 from pipelines.experiment_report import write_experiment
 from pipelines.experiment_summary import published_orders, rmse_figures, summarise_experiment
 from pipelines.experiments import EXPERIMENTS
-from pipelines.told_noise import NoiseRatio, tell
+from pipelines.restarted import Restarted
+from pipelines.told_noise import NoiseRatio, StartErrors, displace_start, tell
 from synthetic_logs.scenarios import SCENARIOS
 
 
@@ -67,6 +71,55 @@ def test_outcomes_do_not_depend_on_the_processes(outcome):
     assert not np.array_equal(computed[1].arms["fixed"].errors, outcome.arms["fixed"].errors)
 
 
+def test_a_restarted_adapter_has_no_memory_of_what_was_before():
+    adapter = Restarted(Iae(window=5), (100,))
+    state, fresh = adapter.init(), None
+    for t_ns in range(60, 160, 20):
+        if t_ns == 100:
+            fresh = Iae(window=5).init()
+        innovation = Innovation(np.array([t_ns / 10.0]), np.eye(1), np.eye(1), np.eye(1), ("a",), t_ns)
+        _, noise, state = adapter.adapt(state, Gaussian(np.zeros(1), np.eye(1)), innovation)
+        if fresh is not None:
+            _, expected, fresh = Iae(window=5).adapt(fresh, Gaussian(np.zeros(1), np.eye(1)), innovation)
+            np.testing.assert_array_equal(noise, expected)
+    remembering = Iae(window=5)
+    state = remembering.init()
+    for t_ns in range(60, 160, 20):
+        innovation = Innovation(np.array([t_ns / 10.0]), np.eye(1), np.eye(1), np.eye(1), ("a",), t_ns)
+        _, noise, state = remembering.adapt(state, Gaussian(np.zeros(1), np.eye(1)), innovation)
+    assert not np.array_equal(noise, expected)
+
+
+def test_a_filter_starts_with_the_errors_it_is_given():
+    log = synthetic_logs.simulate(synthetic_logs.with_duration(SCENARIOS["told-noise"], 5.0), 1)
+    errors = StartErrors((8.0, -8.0, 15.0), (0.5, 0.5, -0.5))
+    displaced = displace_start(tell(log, "log"), log, errors).fixes
+    true = log.fix_errors.antenna
+    np.testing.assert_allclose(earth.ned_between(true.lla[0], displaced.lla[0]), errors.position, atol=1e-3)
+    np.testing.assert_allclose(displaced.vel_n[0] - true.vel_n[0], errors.velocity, atol=1e-12)
+    np.testing.assert_allclose(np.diag(displaced.cov_pos[0]), [64.0, 64.0, 225.0])
+    np.testing.assert_array_equal(displaced.lla[1:], log.fixes.lla[1:])
+    np.testing.assert_array_equal(displaced.cov_vel[1:], log.fixes.cov_vel[1:])
+
+
+def test_mean_noise_and_settling_are_those_of_the_components():
+    t_s = np.arange(60.0) + 0.5
+    true, ratio = np.tile([4.0, 9.0], (60, 1)), np.ones((60, 2))
+    ratio[:50, 0], ratio[:50, 1] = 4.0, 9.0
+    noise = {"position": NoiseRatio(np.repeat(t_s, 2), (true * ratio).ravel(), ratio.ravel(), ("north", "east"))}
+    arm = ArmOutcome(np.zeros((60, 9)), np.ones((60, 3)), noise, 60)
+    outcomes = [Outcome(1, t_s, dict.fromkeys(("fixed", "srmakf", "oracle"), arm), {}, {"fixed": 0.12})]
+    experiment = shorten("redundant-noise", 60.0, ("fixed", "srmakf"))
+    claim = replace(experiment.noise_claims[0], kind="position")
+    experiment = replace(experiment, noise_claims=(claim,))
+    outcomes[0].seconds.update(srmakf=0.0, oracle=0.0)
+    report = summarise_experiment(experiment, outcomes)["arms"]["fixed"]
+    end = report["stretches"]["end"]
+    assert end["noise_used"]["position east"] == {"used": pytest.approx((81 * 10 + 9 * 10) / 20), "true": 9.0}
+    assert end["noise_settled_s"] == {"position": 10.5}
+    assert report["cpu_ms_per_epoch"] == pytest.approx(2.0)
+
+
 def test_too_few_seeds_or_jobs():
     with pytest.raises(LogError, match="at least one seed and one job"):
         run_experiment(EXPERIMENTS["ermakf-city"], 0, 1)
@@ -80,7 +133,9 @@ def made_outcome(seed: int, errors: dict[str, float], nees: float = 3.0) -> Outc
         table = np.zeros((60, 9))
         table[:, 0] = table[:, 3] = error
         table[:, 8] = np.radians(error)
-        arms[label] = ArmOutcome(table, np.full((60, 3), nees), {"range": NoiseRatio(t_s, np.full(60, 1.05))})
+        arms[label] = ArmOutcome(
+            table, np.full((60, 3), nees), {"range": NoiseRatio(t_s, np.full(60, 2.1), np.full(60, 1.05))}, 60
+        )
     return Outcome(seed, t_s, arms, {}, dict.fromkeys(errors, 0.1))
 
 
@@ -179,6 +234,9 @@ def test_every_experiment_names_what_it_has():
         for noise in experiment.noise_claims:
             assert noise.arm in labels
             assert noise.stretch in stretches
+        for row in experiment.published_noise:
+            assert row.arm in labels
+            assert row.stretch in stretches
 
 
 def test_the_moment_oracle_is_told_second_moments_and_means():
