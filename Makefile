@@ -16,6 +16,7 @@ test: .venv/.tested
 benchmark: .venv/.tested
 	$(BIN)/python benchmarks/import_speed.py
 	$(BIN)/python benchmarks/run_speed.py
+	$(BIN)/python benchmarks/method_speed.py
 
 clean:
 	rm -rf .venv out build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis .import_linter_cache

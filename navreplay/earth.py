@@ -1,8 +1,12 @@
 """WGS-84: ellipsoid, normal gravity, rates of the navigation frame, geodetic / Earth-fixed / local coordinates.
 
 Constants and the gravity formula: NGA.STND.0036 (WGS 84, version 1.0.0, 2014). Latitude and longitude [rad], height above
-the ellipsoid [m], Earth-fixed coordinates [m]; everything broadcasts over leading dimensions.
+the ellipsoid [m], Earth-fixed coordinates [m]; everything broadcasts over leading dimensions, and single points, of which
+every measurement epoch has some, go by plain floats.
 """
+
+import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -49,9 +53,18 @@ _SEMI_MINOR_AXIS = SEMI_MAJOR_AXIS * (1 - FLATTENING)
 
 def radii(lat: ArrayLike) -> tuple[Floats, Floats]:
     """Radii of curvature in the meridian and in the prime vertical [m] at latitude (...)."""
-    w2 = 1 - ECCENTRICITY_SQUARED * np.sin(np.asarray(lat, dtype=np.float64)) ** 2
-    normal = SEMI_MAJOR_AXIS / np.sqrt(w2)
+    sine, _ = _sine_cosine(lat)
+    w2 = 1 - ECCENTRICITY_SQUARED * sine**2
+    normal = SEMI_MAJOR_AXIS / w2**0.5
     return normal * (1 - ECCENTRICITY_SQUARED) / w2, normal
+
+
+def _sine_cosine(angle: ArrayLike) -> tuple[Any, Any]:
+    """Of an angle (...) [rad]; as floats where it is one."""
+    if isinstance(angle, float):
+        return math.sin(angle), math.cos(angle)
+    angle = np.asarray(angle, dtype=np.float64)
+    return np.sin(angle), np.cos(angle)
 
 
 def gravity(lat: ArrayLike, height: ArrayLike) -> Floats:
@@ -66,10 +79,10 @@ def gravity(lat: ArrayLike, height: ArrayLike) -> Floats:
 
 def earth_rate_n(lat: ArrayLike) -> Floats:
     """Rotation of the Earth in NED [rad/s], (..., 3)."""
-    lat = np.asarray(lat, dtype=np.float64)
-    if lat.ndim == 0:
-        return np.array([EARTH_RATE * np.cos(lat), 0.0, -EARTH_RATE * np.sin(lat)])
-    return np.stack([EARTH_RATE * np.cos(lat), np.zeros_like(lat), -EARTH_RATE * np.sin(lat)], axis=-1)
+    sine, cosine = _sine_cosine(lat)
+    if np.ndim(sine) == 0:
+        return np.array([EARTH_RATE * cosine, 0.0, -EARTH_RATE * sine])
+    return np.stack([EARTH_RATE * cosine, np.zeros_like(sine), -EARTH_RATE * sine], axis=-1)
 
 
 def transport_rate_n(lla: Floats, vel_n: Floats) -> Floats:
@@ -83,13 +96,14 @@ def transport_rate_n(lla: Floats, vel_n: Floats) -> Floats:
 def ecef_from_lla(lla: Floats) -> Floats:
     """Earth-fixed coordinates (..., 3) [m] of geodetic ones (..., 3) [rad, rad, m]."""
     lla = np.asarray(lla, dtype=np.float64)
-    lat, lon, height = lla[..., 0], lla[..., 1], lla[..., 2]
+    lat, lon, height = lla.tolist() if lla.ndim == 1 else (lla[..., 0], lla[..., 1], lla[..., 2])
+    (sl, cl), (so, co) = _sine_cosine(lat), _sine_cosine(lon)
     _, normal = radii(lat)
-    across = (normal + height) * np.cos(lat)
-    up = (normal * (1 - ECCENTRICITY_SQUARED) + height) * np.sin(lat)
-    if lat.ndim == 0:
-        return np.array([across * np.cos(lon), across * np.sin(lon), up])
-    return np.stack([across * np.cos(lon), across * np.sin(lon), up], axis=-1)
+    across = (normal + height) * cl
+    up = (normal * (1 - ECCENTRICITY_SQUARED) + height) * sl
+    if lla.ndim == 1:
+        return np.array([across * co, across * so, up])
+    return np.stack([across * co, across * so, up], axis=-1)
 
 
 def lla_from_ecef(ecef: Floats) -> Floats:
@@ -118,10 +132,8 @@ def lla_from_ecef(ecef: Floats) -> Floats:
 
 def matrix_en(lat: ArrayLike, lon: ArrayLike) -> Floats:
     """C_en (..., 3, 3): projects from NED at latitude, longitude to the Earth-fixed frame."""
-    lat = np.asarray(lat, dtype=np.float64)
-    lon = np.asarray(lon, dtype=np.float64)
-    sl, cl, so, co = np.sin(lat), np.cos(lat), np.sin(lon), np.cos(lon)
-    if lat.ndim == 0 and lon.ndim == 0:  # of a single point, without the cost of stacking
+    (sl, cl), (so, co) = _sine_cosine(lat), _sine_cosine(lon)
+    if np.ndim(sl) == np.ndim(so) == 0:
         return np.array([[-sl * co, -so, -cl * co], [-sl * so, co, -cl * so], [cl, 0.0, -sl]])
     rows = [[-sl * co, -so, -cl * co], [-sl * so, co, -cl * so], [cl, np.zeros_like(cl), -sl]]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
@@ -138,11 +150,13 @@ def move_lla(lla: Floats, offset_n: Floats) -> Floats:
     """Position (..., 3) offset_n (..., 3) [m, NED] away from lla (..., 3); first order in offset over Earth radius, for offsets
     of lever arms and filter corrections (an offset of 100 m errs by 1 mm)."""
     lla = np.asarray(lla, dtype=np.float64)
+    if lla.ndim == 1:
+        lat, _, height = lla.tolist()
+        meridian, normal = radii(lat)
+        metres = np.array([1 / (meridian + height), 1 / ((normal + height) * math.cos(lat)), -1.0])
+        return np.asarray(lla + metres * offset_n)
     meridian, normal = radii(lla[..., 0])
     height = lla[..., 2]
-    if lla.ndim == 1:
-        metres = np.array([1 / (meridian + height), 1 / ((normal + height) * np.cos(lla[0])), -1.0])
-        return np.asarray(lla + metres * offset_n)
     scale = np.stack([1 / (meridian + height), 1 / ((normal + height) * np.cos(lla[..., 0])), -np.ones_like(height)], axis=-1)
     return np.asarray(lla + scale * offset_n)
 

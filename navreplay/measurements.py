@@ -1,5 +1,6 @@
 """Measurements of the NED filters: what was measured, minus what the state predicts, with Jacobian and nominal noise."""
 
+from math import cos
 from typing import NamedTuple
 
 import numpy as np
@@ -18,11 +19,14 @@ __all__ = [
     "cross_matrix",
     "fix_noise",
     "join",
+    "position_jacobian",
     "position_measurement",
+    "velocity_jacobian",
     "velocity_measurement",
 ]
 
 _AXES = ("north", "east", "down")
+_IDENTITY = np.eye(3)
 
 
 class Measurement(NamedTuple):
@@ -81,12 +85,10 @@ def position_measurement(state: NavState, lever_b: Floats, lla: Floats, noise: F
     lever_n = matrix_from_quat(state.q_nb) @ lever_b
     meridian, normal = earth.radii(state.lla[0])
     height = state.lla[2]
-    metres = np.array([meridian + height, (normal + height) * np.cos(state.lla[0]), -1.0])
+    metres = np.array([meridian + height, (normal + height) * cos(state.lla[0]), -1.0])
     difference = lla - state.lla
     difference[1] = (difference[1] + np.pi) % (2 * np.pi) - np.pi
-    jacobian = np.zeros((3, size))
-    jacobian[:, POSITION] = np.eye(3)
-    jacobian[:, ATTITUDE] = -cross_matrix(lever_n)
+    jacobian = position_jacobian(lever_n, size)
     return Measurement(difference * metres - lever_n, jacobian, noise, ("position",) * 3, _AXES)
 
 
@@ -96,12 +98,27 @@ def velocity_measurement(
     """Antenna velocity vel_n (3,) NED against the IMU's plus w x l, with rate_b (3,) of the body against the Earth [rad/s]."""
     c_nb = matrix_from_quat(state.q_nb)
     swing_n = c_nb @ (cross_matrix(rate_b) @ lever_b)
-    jacobian = np.zeros((3, size))
-    jacobian[:, VELOCITY] = np.eye(3)
-    jacobian[:, ATTITUDE] = -cross_matrix(swing_n)
-    for columns in gyro_columns(size):
-        jacobian[:, columns] = c_nb @ cross_matrix(lever_b)
+    jacobian = velocity_jacobian(c_nb, lever_b, swing_n, size)
     return Measurement(vel_n - state.vel_n - swing_n, jacobian, noise, ("velocity",) * 3, _AXES)
+
+
+def position_jacobian(lever_n: Floats, size: int) -> Floats:
+    """(3, size) of the antenna's position, lever_n (3,) [m] off the IMU in NED, against the error state."""
+    jacobian = np.zeros((3, size))
+    jacobian[:, POSITION] = _IDENTITY
+    jacobian[:, ATTITUDE] = -cross_matrix(lever_n)
+    return jacobian
+
+
+def velocity_jacobian(c_nb: Floats, lever_b: Floats, swing_n: Floats, size: int) -> Floats:
+    """(3, size) of the antenna's velocity against the error state: swing_n (3,) [m/s] of it comes from the body's turning."""
+    jacobian = np.zeros((3, size))
+    jacobian[:, VELOCITY] = _IDENTITY
+    jacobian[:, ATTITUDE] = -cross_matrix(swing_n)
+    turned = c_nb @ cross_matrix(lever_b)
+    for columns in gyro_columns(size):
+        jacobian[:, columns] = turned
+    return jacobian
 
 
 def join(parts: list[Measurement]) -> Measurement:
@@ -125,4 +142,5 @@ def join(parts: list[Measurement]) -> Measurement:
 
 def cross_matrix(v: Floats) -> Floats:
     """(3, 3) of the cross product with v (3,) from the left: `rotation.skew` for a single vector, ten times as fast."""
-    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+    x, y, z = v.tolist()
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from navreplay import earth
 from navreplay.atmosphere import SPEED_OF_LIGHT
-from navreplay.error_models.ned import ATTITUDE, POSITION, VELOCITY, gyro_columns
-from navreplay.measurements import Measurement, cross_matrix
+from navreplay.error_models.ned import POSITION, VELOCITY
+from navreplay.measurements import Measurement, cross_matrix, position_jacobian, velocity_jacobian
 from navreplay.range_epochs import RangeEpochs
 from navreplay.rotation import matrix_from_quat
 from navreplay.strapdown import NavState
@@ -39,14 +39,7 @@ def carried_antenna(state: NavState, lever_b: Floats, rate_b: Floats, size: int)
     c_en = earth.matrix_en(state.lla[0], state.lla[1])
     lever_n = c_nb @ lever_b
     swing_n = c_nb @ (cross_matrix(rate_b) @ lever_b)
-    position = np.zeros((3, size))
-    position[:, POSITION] = np.eye(3)
-    position[:, ATTITUDE] = -cross_matrix(lever_n)
-    velocity = np.zeros((3, size))
-    velocity[:, VELOCITY] = np.eye(3)
-    velocity[:, ATTITUDE] = -cross_matrix(swing_n)
-    for columns in gyro_columns(size):
-        velocity[:, columns] = c_nb @ cross_matrix(lever_b)
+    position, velocity = position_jacobian(lever_n, size), velocity_jacobian(c_nb, lever_b, swing_n, size)
     pos_e = earth.ecef_from_lla(state.lla) + c_en @ lever_n
     return Antenna(pos_e, c_en, state.vel_n + swing_n, position, velocity)
 

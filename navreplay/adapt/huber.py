@@ -16,7 +16,7 @@ import numpy as np
 
 from navreplay.adapt.adapter import Adaptation
 from navreplay.adapt.ratio import scale_noise
-from navreplay.filters.core import Gaussian, Innovation
+from navreplay.filters.core import Gaussian, Innovation, solve
 from navreplay.timeline import Floats
 
 __all__ = ["Huber"]
@@ -39,7 +39,7 @@ class Huber:
         weight = np.ones(len(std))
         noise = innovation.noise
         for _ in range(self.iterations):
-            posterior_residual = noise @ np.linalg.solve(innovation.spread + noise, innovation.residual)
+            posterior_residual = noise @ solve(innovation.spread + noise, innovation.residual)
             new = self._weigh(posterior_residual / std)
             settled = np.abs(new - weight).max() < self.tolerance
             weight = new

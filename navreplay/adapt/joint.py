@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from navreplay.filters.core import Gaussian, Innovation, kalman_gain, symmetric
+from navreplay.filters.core import Gaussian, Innovation, solve, symmetric
 from navreplay.timeline import Floats
 
 __all__ = ["inflate", "posterior_square"]
@@ -13,7 +13,7 @@ def posterior_square(innovation: Innovation, noise: Floats) -> Floats:
 
     The posterior residual is R S^-1 nu, the posterior's spread H P H' - H P H' S^-1 H P H' = R S^-1 H P H'.
     """
-    keep = kalman_gain(innovation._replace(cross=noise), noise)
+    keep = solve(innovation.spread + noise, noise).T
     return np.asarray((keep @ innovation.residual) ** 2 + (keep * innovation.spread).sum(axis=1))
 
 

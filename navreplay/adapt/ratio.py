@@ -10,8 +10,8 @@ __all__ = ["excess_ratio", "scale_noise"]
 
 def excess_ratio(innovation: Innovation) -> Floats:
     """(m,) (nu_i^2 - spread_ii) / R_ii: unbiased for the variance ratio of one epoch, and of either sign."""
-    excess = innovation.residual**2 - np.diagonal(innovation.spread)
-    return np.asarray(excess / np.diagonal(innovation.noise))
+    excess = innovation.residual**2 - innovation.spread.diagonal()
+    return np.asarray(excess / innovation.noise.diagonal())
 
 
 def scale_noise(noise: Floats, ratio: Floats) -> Floats:

@@ -46,13 +46,11 @@ class SageHusa:
     def adapt(self, state: Mapping[str, Fading], prior: Gaussian, innovation: Innovation) -> Adaptation[Mapping[str, Fading]]:
         """R scaled by the fading mean of each component's ratios, this epoch's included."""
         told = Fading(1.0, self.told_epochs)
-        before = [state.get(label, told) for label in innovation.labels]
-        weight = np.array([self._weigh(fading.epochs) for fading in before])
-        last = np.array([fading.ratio for fading in before])
-        ratio = np.maximum((1 - weight) * last + weight * excess_ratio(innovation), self.floor)
-        after = zip(innovation.labels, ratio.tolist(), before, strict=True)
-        fadings = {label: Fading(value, fading.epochs + 1) for label, value, fading in after}
+        pairs = zip(innovation.labels, excess_ratio(innovation).tolist(), strict=True)
+        fadings = {label: self._fade(state.get(label, told), ratio) for label, ratio in pairs}
+        ratio = np.array([fading.ratio for fading in fadings.values()])
         return Adaptation(prior, scale_noise(innovation.noise, ratio), {**state, **fadings})
 
-    def _weigh(self, epochs: int) -> float:
-        return (1 - self.forgetting) / (1 - self.forgetting ** (epochs + 1))
+    def _fade(self, last: Fading, ratio: float) -> Fading:
+        weight = (1 - self.forgetting) / (1 - self.forgetting ** (last.epochs + 1))
+        return Fading(max((1 - weight) * last.ratio + weight * ratio, self.floor), last.epochs + 1)

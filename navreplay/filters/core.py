@@ -8,7 +8,7 @@ from scipy.linalg.lapack import dposv
 
 from navreplay.timeline import Floats, LogError
 
-__all__ = ["Gaussian", "Innovation", "Leftover", "chi_square", "condition", "kalman_gain", "symmetric"]
+__all__ = ["Gaussian", "Innovation", "Leftover", "chi_square", "condition", "kalman_gain", "solve", "symmetric"]
 
 
 class Gaussian(NamedTuple):
@@ -62,7 +62,7 @@ def symmetric(matrix: Floats) -> Floats:
 
 def kalman_gain(innovation: Innovation, noise: Floats) -> Floats:
     """Gain K (n, m) = cross S^-1 with S = spread + noise (m, m)."""
-    return _solve(innovation.spread + noise, innovation.cross.T).T
+    return solve(innovation.spread + noise, innovation.cross.T).T
 
 
 def condition(prior: Gaussian, innovation: Innovation, noise: Floats, gain: Floats | None = None) -> Gaussian:
@@ -80,11 +80,15 @@ def condition(prior: Gaussian, innovation: Innovation, noise: Floats, gain: Floa
 
 def chi_square(residual: Floats, cov: Floats) -> float:
     """residual' cov^-1 residual, of residual (m,) and cov (m, m)."""
-    return float(residual @ _solve(cov, residual))
+    return float(residual @ solve(cov, residual))
 
 
-def _solve(cov: Floats, right: Floats) -> Floats:
-    """cov^-1 right by Cholesky; the bare LAPACK call, whose wrappers would cost ten times the work at these sizes."""
+def solve(cov: Floats, right: Floats) -> Floats:
+    """cov^-1 right by Cholesky, of the covariance (m, m) of an innovation and right (m, ...).
+
+    The bare LAPACK call, whose wrappers would cost ten times the work at these sizes. Raises LogError where cov is not
+    positive definite.
+    """
     _, solution, info = dposv(cov, right, lower=True)
     if info != 0:
         raise LogError(

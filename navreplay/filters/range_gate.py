@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import chdtri
 
-from navreplay.filters.core import Innovation
+from navreplay.filters.core import Innovation, solve
 from navreplay.filters.record import JudgedRows, Recorder
 from navreplay.options import GateOptions
 from navreplay.timeline import Floats
@@ -74,19 +74,19 @@ class RangeGate:
 
 def _exclude(residual: Floats, cov: Floats, limit: float) -> tuple[Floats, np.ndarray]:
     """Normalised squares (m,), each when it was last looked at, and which components (m,) are left."""
-    inverse = np.linalg.inv(cov)
+    precision = solve(cov, np.eye(len(cov)))
     squares = np.zeros(len(residual))
     left = np.ones(len(residual), dtype=np.bool_)
     while left.any():
         alive = np.flatnonzero(left)
-        weight = np.diagonal(inverse)[alive]
-        squares[alive] = (inverse[alive] @ residual) ** 2 / weight
+        weight = np.diagonal(precision)[alive]
+        squares[alive] = (precision[alive] @ residual) ** 2 / weight
         worst = alive[squares[alive].argmax()]
         if squares[worst] <= limit:
             break
         left[worst] = False
         # what is left of the inverse when a row and column leave the matrix
-        column = inverse[:, worst].copy()
-        inverse -= column[:, None] * column / column[worst]
-        inverse[worst, :] = inverse[:, worst] = 0.0
+        column = precision[:, worst].copy()
+        precision -= column[:, None] * column / column[worst]
+        precision[worst, :] = precision[:, worst] = 0.0
     return squares, left
