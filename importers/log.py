@@ -46,7 +46,11 @@ class Log(Protocol):
 
     path: str
     format: str
-    notes: tuple[str, ...]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is told of damage."""
+        ...
 
     def channels(self) -> tuple[Channel, ...]:
         """All channels, in the order of the file."""

@@ -8,10 +8,10 @@ from mcap.opcode import Opcode
 
 from importers.channel_reading import read_tables, require_channels
 from importers.compression import DamagedDataError
-from importers.file_bytes import map_file
 from importers.log import Channel, Table
 from importers.mcap_records import MAGIC, MESSAGE_HEADER, RECORD_HEAD, Directory, open_chunk, read_summary, walk_file
 from importers.message_blocks import Block, Buffer, Decoder, Loss, Offsets
+from importers.record_file import RecordFile
 from importers.record_walk import Walk
 from navreplay.timeline import LogError
 
@@ -33,10 +33,14 @@ class McapLog:
 
     def __init__(self, path: str) -> None:
         self.path = str(path)
-        self.notes: tuple[str, ...] = ()
-        self._buffer = map_file(self.path, MAGIC, "an MCAP file")
-        self._records: Walk | None = None
+        self._file = RecordFile(self.path, MAGIC, "an MCAP file", walk_file)
+        self._buffer = self._file.buffer
         self._directory = read_summary(self._buffer) or self._scan()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """See `Log`."""
+        return self._file.notes
 
     def channels(self) -> tuple[Channel, ...]:
         """See `Log`. Channel numbers of one topic are one channel; its type is that of the first."""
@@ -93,21 +97,10 @@ class McapLog:
             return RosDecoder(find_type(schema.name, schema.data.decode(errors="replace"), language, encoding), encoding)
         raise LogError(f"message encoding {encoding!r} is not supported; cdr, ros1, json and protobuf are")
 
-    def _note(self, text: str) -> None:
-        if text not in self.notes:
-            self.notes = (*self.notes, text)
-
-    def _walk(self, landmarks: Offsets) -> Walk:
-        if self._records is None:
-            self._records = walk_file(self._buffer, landmarks)
-            for offset, limit in self._records.fragments:
-                self._note(f"damaged from byte {offset} to {limit} of {len(self._buffer)}; the rest was read")
-        return self._records
-
     def _scan(self) -> Directory:
         """The directory of a file without a usable index, from all its records."""
-        self._note("no usable index (was the recording closed?); the file was read through from its start")
-        walk = self._walk(np.empty(0, dtype=np.int64))
+        self._file.note("no usable index (was the recording closed?); the file was read through from its start")
+        walk = self._file.walk(np.empty(0, dtype=np.int64))
         directory, counts = Directory(), Counter[int]()
         for place in np.flatnonzero((walk.op == Opcode.SCHEMA) | (walk.op == Opcode.CHANNEL)):
             directory.add(walk.op[place], self._buffer[walk.start[place] : walk.stop[place]])
@@ -124,7 +117,7 @@ class McapLog:
         return directory
 
     def _messages(self, wanted: set[int]) -> Iterator[Block | Loss]:
-        return self._blocks(self._walk(self._directory.chunk_offsets), wanted, self._directory)
+        return self._blocks(self._file.walk(self._directory.chunk_offsets), wanted, self._directory)
 
     def _blocks(self, walk: Walk, wanted: set[int] | None, directory: Directory) -> Iterator[Block | Loss]:
         """Blocks of all chunks that may hold a wanted channel (None: any), then of the messages outside chunks. Schemas and
@@ -135,11 +128,11 @@ class McapLog:
             try:
                 records, whole = open_chunk(self._buffer[start:stop])
             except DamagedDataError as error:
-                self._note(f"the chunk at byte {start} {error} and was left out")
+                self._file.note(f"the chunk at byte {start} {error} and was left out")
                 yield Loss(indexed, "in a damaged chunk")
                 continue
             if not whole:
-                self._note(f"the chunk at byte {start} is cut off; {len(records)} bytes of it could be unpacked")
+                self._file.note(f"the chunk at byte {start} is cut off; {len(records)} bytes of it could be unpacked")
             yield from self._chunk_blocks(records, directory, start if whole else None)
         yield from _message_blocks(self._buffer, walk.op, walk.start, walk.stop)
 
@@ -158,7 +151,7 @@ class McapLog:
 
         opcode, start, stop, end = scan_mcap(records, 0)
         if at is not None and end != len(records):
-            self._note(f"the chunk at byte {at} is damaged inside; {len(records) - end} bytes of it were left out")
+            self._file.note(f"the chunk at byte {at} is damaged inside; {len(records) - end} bytes of it were left out")
         for place in np.flatnonzero((opcode == Opcode.SCHEMA) | (opcode == Opcode.CHANNEL)):
             directory.add(opcode[place], records[start[place] : stop[place]])
         yield from _message_blocks(records, opcode, start, stop)

@@ -8,9 +8,9 @@ import numpy as np
 from importers.bag_records import MAGIC, Directory, Op, header_fields, open_chunk, read_index, walk_file
 from importers.channel_reading import read_tables, require_channels
 from importers.compression import DamagedDataError
-from importers.file_bytes import map_file
 from importers.log import Channel, Table
-from importers.message_blocks import Block, Buffer, Decoder, Loss, Offsets
+from importers.message_blocks import Block, Buffer, Decoder, Loss
+from importers.record_file import RecordFile
 from importers.record_walk import Walk
 from navreplay.timeline import LogError
 
@@ -29,10 +29,14 @@ class Ros1Bag:
 
     def __init__(self, path: str) -> None:
         self.path = str(path)
-        self.notes: tuple[str, ...] = ()
-        self._buffer = map_file(self.path, MAGIC, "a ROS 1 bag of format 2.0")
-        self._records: Walk | None = None
+        self._file = RecordFile(self.path, MAGIC, "a ROS 1 bag of format 2.0", walk_file)
+        self._buffer = self._file.buffer
         self._directory = read_index(self._buffer) or self._scan()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """See `Log`."""
+        return self._file.notes
 
     def channels(self) -> tuple[Channel, ...]:
         """See `Log`. Connections of one topic are one channel; its type is that of the first."""
@@ -67,21 +71,10 @@ class Ros1Bag:
         connection = self._directory.connections[number]
         return RosDecoder(find_type(connection.type, connection.definition, "msg", "ros1"), "ros1")
 
-    def _note(self, text: str) -> None:
-        if text not in self.notes:
-            self.notes = (*self.notes, text)
-
-    def _walk(self, landmarks: Offsets) -> Walk:
-        if self._records is None:
-            self._records = walk_file(self._buffer, landmarks)
-            for offset, limit in self._records.fragments:
-                self._note(f"damaged from byte {offset} to {limit} of {len(self._buffer)}; the rest was read")
-        return self._records
-
     def _scan(self) -> Directory:
         """The directory of a bag without a usable index, from all its records."""
-        self._note("no usable index (was the recording closed?); the bag was read through from its start")
-        walk = self._walk(np.empty(0, dtype=np.int64))
+        self._file.note("no usable index (was the recording closed?); the bag was read through from its start")
+        walk = self._file.walk(np.empty(0, dtype=np.int64))
         directory, counts = Directory(), Counter[int]()
         for place in np.flatnonzero(walk.op == Op.CONNECTION):
             directory.add(
@@ -97,7 +90,7 @@ class Ros1Bag:
         return directory
 
     def _messages(self, wanted: set[int]) -> Iterator[Block | Loss]:
-        return self._blocks(self._walk(self._directory.chunk_offsets), wanted, self._directory)
+        return self._blocks(self._file.walk(self._directory.chunk_offsets), wanted, self._directory)
 
     def _blocks(self, walk: Walk, wanted: set[int] | None, directory: Directory) -> Iterator[Block | Loss]:
         """Blocks of all chunks that may hold a wanted connection (None: any). Connections met on the way enter the
@@ -108,14 +101,14 @@ class Ros1Bag:
             try:
                 opened = open_chunk(self._buffer[at:stop])
             except DamagedDataError as error:
-                self._note(f"the chunk at byte {at} {error} and was left out")
+                self._file.note(f"the chunk at byte {at} {error} and was left out")
                 yield Loss(indexed, "in a damaged chunk")
                 continue
             if opened is None:
                 continue
             records, whole = opened
             if not whole:
-                self._note(f"the chunk at byte {at} is cut off; {len(records)} bytes of it could be unpacked")
+                self._file.note(f"the chunk at byte {at} is cut off; {len(records)} bytes of it could be unpacked")
             yield self._chunk_block(records, directory, at if whole else None)
 
     def _chunks(self, walk: Walk) -> list[tuple[int, int, dict[int, int]]]:
@@ -129,7 +122,7 @@ class Ros1Bag:
 
         op, conn, time, header, start, stop, end = scan_bag(records, 0)
         if at is not None and end != len(records):
-            self._note(f"the chunk at byte {at} is damaged inside; {len(records) - end} bytes of it were left out")
+            self._file.note(f"the chunk at byte {at} is damaged inside; {len(records) - end} bytes of it were left out")
         for place in np.flatnonzero(op == Op.CONNECTION):
             directory.add(records[header[place] : start[place] - 4], records[start[place] : stop[place]])
         message = (op == Op.MESSAGE) & (time >= 0)
