@@ -54,10 +54,9 @@ def fix_noise(fixes: GnssFixSeries, options: FilterOptions) -> FixNoise:
     position = _fill_unknown(fixes.cov_pos, default)
     across, along_down = options.default_velocity_std
     velocity = _fill_unknown(fixes.cov_vel, np.tile(np.square([across, across, along_down]), (len(fixes), 1)))
-    scale = options.noise_scale**2
     return FixNoise(
-        _raise_diagonal(position, options.position_std_floor**2) * scale,
-        _raise_diagonal(velocity, options.velocity_std_floor**2) * scale,
+        _raise_diagonal(position, options.position_std_floor**2) * (options.noise_scale * options.position_noise_scale) ** 2,
+        _raise_diagonal(velocity, options.velocity_std_floor**2) * (options.noise_scale * options.velocity_noise_scale) ** 2,
     )
 
 

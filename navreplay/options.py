@@ -106,7 +106,8 @@ class RangeOptions:
     them what is not yet corrected. clock_noise [m/sqrt(s)] and clock_drift_walk [m/s/sqrt(s)]: white noise of the receiver
     clock's frequency, and its random walk. system_offset_std [m]: of another constellation's clock offset against the first's,
     before it is seen; system_offset_walk [m/sqrt(s)]: its random walk. clock_jump [m]: a common jump of all pseudoranges beyond
-    it is the clock's.
+    it is the clock's. pseudorange_noise_scale, range_rate_noise_scale: on the standard deviations, beside
+    FilterOptions.noise_scale.
     """
 
     pseudorange_std: float = 1.0
@@ -123,6 +124,8 @@ class RangeOptions:
     system_offset_std: float = 300.0
     system_offset_walk: float = 0.01
     clock_jump: float = 150.0
+    pseudorange_noise_scale: float = 1.0
+    range_rate_noise_scale: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +144,8 @@ class FilterOptions:
 
     output_rate [Hz] of rows between GNSS epochs (0: only at GNSS epochs). covariance_interval [s]: longest step of the
     covariance propagation. use_velocity: take GNSS velocity where the log has it. noise_scale multiplies the standard
-    deviations of all GNSS measurements. position_std_floor [m], velocity_std_floor [m/s]: least standard deviations believed.
+    deviations of all GNSS measurements, position_noise_scale and velocity_noise_scale those of fixes besides.
+    position_std_floor [m], velocity_std_floor [m/s]: least standard deviations believed.
     default_position_std, default_velocity_std: (horizontal, vertical) by name of FixStatus where the covariance is unknown.
     use: what aids the filter; ``auto`` takes ranges where the log has them. smooth: carry all measurements backward as well.
     """
@@ -154,6 +158,8 @@ class FilterOptions:
     covariance_interval: float = 0.05
     use_velocity: bool = True
     noise_scale: float = 1.0
+    position_noise_scale: float = 1.0
+    velocity_noise_scale: float = 1.0
     position_std_floor: float = 0.01
     velocity_std_floor: float = 0.02
     default_position_std: dict[str, tuple[float, float]] = field(

@@ -1,6 +1,7 @@
 """What a filter returns: states with covariances at every output epoch, innovations, noise used and events."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Literal
 
@@ -73,7 +74,8 @@ class Solution:
     t_ns: (k,). lla: (k, 3) [rad, rad, m]. vel_n: (k, 3) NED [m/s]. q_nb: (k, 4). gyro_bias: (k, 3) [rad/s].
     accel_bias: (k, 3) [m/s^2]. cov: (k, n, n) of the error state in the order of state_names; the first nine are position
     NED [m], velocity NED [m/s] and rotation vector in n [rad] (true attitude = exp(phi x) computed attitude).
-    status: (k,) int8 of RowStatus. method: name of the preset.
+    status: (k,) int8 of RowStatus. method: name of the preset. estimated: figures of the noise that a method found in the whole
+    log and filtered with, by their names in `FilterOptions` and what it holds; empty for other methods.
     """
 
     t_ns: Times
@@ -90,6 +92,7 @@ class Solution:
     innovations: tuple[InnovationSeries, ...] = ()
     events: tuple[Event, ...] = ()
     outages: tuple[Outage, ...] = ()
+    estimated: Mapping[str, float] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.t_ns)

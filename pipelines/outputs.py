@@ -5,6 +5,7 @@ from pathlib import Path
 
 from navreplay.timeline import LogError
 from pipelines.comparison import build_comparison, comparison_figures, comparison_plots, comparison_tables
+from pipelines.estimated import estimated_toml
 from pipelines.report import build_report, dump_json
 from pipelines.report_figures import report_plots
 from pipelines.report_html import render_html
@@ -19,8 +20,9 @@ __all__ = ["label_methods", "write_comparison", "write_outputs"]
 
 
 def write_outputs(result: RunResult, out_dir: Path) -> dict[str, Path]:
-    """Writes solution.csv, report.json, report.md, report.html, config.toml and, unless the configuration says otherwise,
-    recording.rrd. Returns the paths by name. Raises LogError when the folder cannot be written."""
+    """Writes solution.csv, report.json, report.md, report.html, config.toml, config.estimated.toml where the method estimated
+    noise from the whole log, and, unless the configuration says otherwise, recording.rrd. Returns the paths by name. Raises
+    LogError when the folder cannot be written."""
     report = build_report(result)
     title, subtitle = _title(result)
     figures, tables = headline_figures(report), report_tables(report)
@@ -33,6 +35,9 @@ def write_outputs(result: RunResult, out_dir: Path) -> dict[str, Path]:
         "report.html": lambda path: path.write_text(html, encoding="utf-8"),
         "config.toml": lambda path: path.write_text(dump_toml(result.config), encoding="utf-8"),
     }
+    if result.solution.estimated:
+        estimated = estimated_toml(result.config, result.solution)
+        writers["config.estimated.toml"] = lambda path: path.write_text(estimated, encoding="utf-8")
     if result.config.output.recording:
         from pipelines.rerun_view import write_recording  # loading rerun takes a second, and not every run records
 

@@ -24,6 +24,8 @@ class RangeSection(Section):
     range_rate_std_mps: Positive = Field(
         0.05, description="of a strong signal from the zenith, where the receiver reports none [m/s]"
     )
+    pseudorange_noise_scale: Positive = Field(1.0, description="multiplies the standard deviations of pseudoranges")
+    range_rate_noise_scale: Positive = Field(1.0, description="multiplies those of range rates")
     cn0_reference_dbhz: Positive = Field(38.0, description="strength at which these variances double [dB-Hz]")
     pseudorange_std_floor_m: Positive = Field(0.3, description="least standard deviation of a pseudorange believed [m]")
     range_rate_std_floor_mps: Positive = Field(0.01, description="least standard deviation of a range rate believed [m/s]")
@@ -46,6 +48,8 @@ class RangeSection(Section):
             range_rate_std=self.range_rate_std_mps,
             pseudorange_std_floor=self.pseudorange_std_floor_m,
             range_rate_std_floor=self.range_rate_std_floor_mps,
+            pseudorange_noise_scale=self.pseudorange_noise_scale,
+            range_rate_noise_scale=self.range_rate_noise_scale,
             cn0_reference=self.cn0_reference_dbhz,
             elevation_mask=self.elevation_mask_deg * _DEG,
             cn0_mask=self.cn0_mask_dbhz,

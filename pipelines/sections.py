@@ -190,6 +190,8 @@ class GnssSection(Section):
     """How far GNSS measurements are believed."""
 
     noise_scale: Positive = Field(1.0, description="multiplies the standard deviations of all GNSS measurements")
+    position_noise_scale: Positive = Field(1.0, description="those of positions besides")
+    velocity_noise_scale: Positive = Field(1.0, description="those of velocities besides")
     position_std_floor_m: NotNegative = Field(0.01, description="least standard deviation of a position believed [m]")
     velocity_std_floor_mps: NotNegative = Field(0.02, description="least standard deviation of a velocity believed [m/s]")
     default_position_std_m: PositionStdSection = Field(

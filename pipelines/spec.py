@@ -64,6 +64,8 @@ def filter_options(config: Config) -> FilterOptions:
         use_velocity=config.filter.use_velocity,
         smooth=config.filter.smooth,
         noise_scale=config.gnss.noise_scale,
+        position_noise_scale=config.gnss.position_noise_scale,
+        velocity_noise_scale=config.gnss.velocity_noise_scale,
         position_std_floor=config.gnss.position_std_floor_m,
         velocity_std_floor=config.gnss.velocity_std_floor_mps,
         default_position_std=config.gnss.default_position_std_m.by_status(),

@@ -10,6 +10,7 @@ from navreplay.rotation import matrix_from_quat
 from navreplay.time_scales import week_tow_from_gps
 from navreplay.timeline import LogError
 from pipelines.compare import compare
+from pipelines.outputs import write_outputs
 from pipelines.process import Drive, filter_drive, process
 from pipelines.progress import show_progress
 from pipelines.spec import load_config
@@ -101,3 +102,15 @@ def test_nobody_watching_means_no_bar(capsys):
     with show_progress(quiet=False) as tell:
         tell("reading", 0.5)
     assert capsys.readouterr().err == ""
+
+
+def test_noise_that_was_estimated_can_be_taken_over(tmp_path):
+    sets = ["filter.name=em-offline", "gnss.noise_scale=2.0", "imu.grade=industrial", "output.recording=false"]
+    result = filter_drive(DRIVE, load_config(None, sets))
+    outputs = write_outputs(result, tmp_path)
+    assert "log-likelihood" in outputs["report.md"].read_text(encoding="utf-8")
+    config = load_config(outputs["config.estimated.toml"])
+    assert config.filter.name == "fixed"
+    assert config.gnss.position_noise_scale == pytest.approx(0.5, rel=0.2)
+    again = filter_drive(DRIVE, config).solution
+    assert np.abs(ned_between(result.solution.lla, again.lla)).max() < 1e-6

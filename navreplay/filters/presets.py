@@ -9,6 +9,7 @@ from navreplay.adapt.adapter import NoiseAdapter
 from navreplay.adapt.correntropy import Correntropy
 from navreplay.adapt.eiakf import Eiakf
 from navreplay.adapt.em import Em, PrintedEm
+from navreplay.adapt.em_offline import EmOffline
 from navreplay.adapt.ermakf import Ermakf
 from navreplay.adapt.ermakf_derived import ErmakfDerived
 from navreplay.adapt.ermakf_whitened import ErmakfWhitened
@@ -23,6 +24,7 @@ from navreplay.adapt.srmakf import Srmakf
 from navreplay.adapt.strong_tracking import StrongTracking
 from navreplay.adapt.student_t import StudentT
 from navreplay.adapt.variational_bayes import VariationalBayes
+from navreplay.filters.calibration import Calibration
 from navreplay.filters.moments import Linearised, MomentRule
 from navreplay.timeline import LogError
 
@@ -31,31 +33,34 @@ __all__ = ["PRESETS", "Method", "Preset", "build_method"]
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """What the epoch loop runs. name: of the preset."""
+    """What the epoch loop runs. name: of the preset. calibration: where the noise is first estimated from the whole log."""
 
     name: str
     rule: MomentRule
     adapter: NoiseAdapter[Any]
+    calibration: Calibration | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Preset:
-    """name, one line of description, and the types of adapter and moment rule, whose fields are the parameters."""
+    """name, one line of description, and the types of adapter, moment rule and calibration, whose fields are the parameters."""
 
     name: str
     description: str
     adapter: Callable[..., NoiseAdapter[Any]]
     rule: Callable[..., MomentRule] = Linearised
+    calibration: Callable[..., Calibration] | None = None
 
     @property
     def parameters(self) -> dict[str, Any]:
         """Names and defaults of the parameters."""
-        return _defaults(self.adapter) | _defaults(self.rule)
+        return _defaults(self.adapter) | _defaults(self.rule) | (_defaults(self.calibration) if self.calibration else {})
 
     def build(self, parameters: Mapping[str, object]) -> Method:
         """The method with parameters, all of them known, replaced."""
         rule, adapter = (_share_of(part, parameters) for part in (self.rule, self.adapter))
-        return Method(self.name, self.rule(**rule), self.adapter(**adapter))
+        calibration = self.calibration(**_share_of(self.calibration, parameters)) if self.calibration else None
+        return Method(self.name, self.rule(**rule), self.adapter(**adapter), calibration)
 
 
 def _defaults(part: Callable[..., Any]) -> dict[str, Any]:
@@ -81,6 +86,7 @@ PRESETS: dict[str, Preset] = {
         Preset("ml-ga", "the same by differential evolution, slow (Gao et al. 2021)", GeneticLikelihood),
         Preset("em-kf", "P and R by expectation maximisation at each epoch (Lai et al. 2022)", Em),
         Preset("em-kf-printed", "the same with equation (30) as printed", PrintedEm),
+        Preset("em-offline", "R and Q by expectation maximisation over the whole log", Fixed, calibration=EmOffline),
         Preset("strong-tracking", "prior inflated by a fading factor (Zhou and Frank 1996, Lou et al. 2019)", StrongTracking),
         Preset("h-infinity", "prior widened against the worst case (Simon 2006, Zhang et al. 2015)", HInfinity),
         Preset("eiakf", "R from innovations, correlated ones taken for AR(1) (Ghaleb et al. 2017)", Eiakf),

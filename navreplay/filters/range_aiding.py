@@ -48,7 +48,9 @@ class RangeAiding:
         self.model = ClockedModel(self._inertial if has_imu else self._free, clock)
         self._has_imu = has_imu
         scale = self._scale = options.noise_scale**2
-        self._variances = self._epochs.pseudorange_std**2 * scale, self._epochs.range_rate_std**2 * scale
+        range_scale = scale * options.ranges.pseudorange_noise_scale**2
+        rate_scale = scale * options.ranges.range_rate_noise_scale**2
+        self._variances = self._epochs.pseudorange_std**2 * range_scale, self._epochs.range_rate_std**2 * rate_scale
         if left_out:
             counts = ", ".join(f"{count} {reason}" for reason, count in left_out.items())
             recorder.tell(int(ranges.t_ns[0]), "info", f"of {len(ranges)} ranges are left out: {counts}")

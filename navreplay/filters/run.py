@@ -1,23 +1,29 @@
 """The epoch loop: inertial propagation to each measurement, then its update. There is no other."""
 
 from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
+from navreplay.adapt.adapter import NoiseAdapter
 from navreplay.alignment import align
 from navreplay.error_models.error_model import ErrorModel
+from navreplay.filters.calibration import settle_nothing
 from navreplay.filters.fix_aiding import FixAiding
 from navreplay.filters.gate import Gate
+from navreplay.filters.linear_log import LinearLog
 from navreplay.filters.presets import Method
 from navreplay.filters.range_aiding import RangeAiding
 from navreplay.filters.range_gate import RangeGate
 from navreplay.filters.record import Recorder
 from navreplay.filters.rows import Rows
 from navreplay.filters.stretches import cut_at_gaps, tell_unreached
+from navreplay.filters.trace import Tracer
 from navreplay.filters.update import Estimator, Updater
 from navreplay.heading import Sources
 from navreplay.options import FilterOptions
-from navreplay.solution import Solution
+from navreplay.solution import Event, Solution
 from navreplay.strapdown import NavState, Steps, idle_steps, make_steps
 from navreplay.timeline import Floats, ImuSeries, LogError, Timeline, Times
 
@@ -32,11 +38,34 @@ def run_filter(timeline: Timeline, method: Method, options: FilterOptions, progr
     progress is called with the share done, from 0 to 1. Raises LogError without anything to aid by, or without IMU where there
     are only fixes; on a gap that the options refuse, or when no alignment is possible.
     """
+    settled = settle_nothing(options, method.adapter)
+    if method.calibration is not None:
+
+        def trace(told: FilterOptions, adapter: NoiseAdapter[Any]) -> tuple[LinearLog, ...]:
+            """What a forward pass with these linearises."""
+            tracers: list[Tracer] = []
+            _run_passes(timeline, replace(method, adapter=adapter), replace(told, output_rate=0.0, smooth=False), tracers)
+            return tuple(log for log in (tracer.linear_log() for tracer in tracers) if log is not None)
+
+        settled = method.calibration.settle(options, trace)
+    solution = _run_passes(timeline, replace(method, adapter=settled.adapter), settled.options, None, progress)
+    told = tuple(Event(int(solution.t_ns[0]), "info", note) for note in settled.notes)
+    return replace(solution, estimated=settled.estimated, events=told + solution.events)
+
+
+def _run_passes(
+    timeline: Timeline,
+    method: Method,
+    options: FilterOptions,
+    tracers: list[Tracer] | None,
+    progress: Progress | None = None,
+) -> Solution:
+    """One pass over all stretches, forward and, where the options say so, backward; tracers, where given, grows by one each."""
     recorder = Recorder()
     name = f"{method.name}-smoothed" if options.smooth else method.name
     if timeline.imu is None:
         alone = _choose_ranges_alone(timeline, options, recorder)
-        rows = [_run_alone(alone, method, options, recorder, _report_of(alone.t_ns, progress))]
+        rows = [_run_alone(alone, method, options, recorder, tracers, _report_of(alone.t_ns, progress))]
         return _join(rows, f"{name} without IMU", alone.model, recorder)
     aiding = _choose_aiding(timeline, options, recorder)
     stretches = cut_at_gaps(timeline.imu, options.gaps, recorder)
@@ -45,7 +74,7 @@ def run_filter(timeline: Timeline, method: Method, options: FilterOptions, progr
     rows = []
     for stretch in stretches:
         try:
-            rows.append(_run_stretch(timeline, aiding, stretch, method, options, recorder, report))
+            rows.append(_run_stretch(timeline, aiding, stretch, method, options, recorder, tracers, report))
         except LogError as error:
             if len(stretches) == 1:
                 raise
@@ -116,6 +145,7 @@ def _run_stretch(
     method: Method,
     options: FilterOptions,
     recorder: Recorder,
+    tracers: list[Tracer] | None,
     report: Callable[[int], None],
 ) -> Rows:
     start = align(Sources(imu, aiding.fixes, timeline.attitude, timeline.reference, options.imu_noise, options.alignment))
@@ -124,18 +154,31 @@ def _run_stretch(
         recorder.tell(start.t_ns, "warning", warning)
     state, cov = aiding.start(start)
     gate = Gate(options.gate) if isinstance(aiding, FixAiding) else RangeGate(options.gate)
-    estimator = Updater(aiding, gate, aiding.model, method, recorder)
+    estimator = _traced(Updater(aiding, gate, aiding.model, method, recorder), aiding, tracers)
     epochs = np.flatnonzero((aiding.t_ns > start.t_ns) & (aiding.t_ns <= imu.t_ns[-1]))
     nodes = np.union1d(aiding.t_ns[epochs], _output_times(start.t_ns, int(imu.t_ns[-1]), options.output_rate))
     steps = make_steps(imu, np.append(nodes, start.t_ns)).after(start.t_ns)
     return _run_epochs(steps, nodes, aiding.t_ns, epochs, state, cov, estimator, aiding.model, options, report)
 
 
+def _traced(estimator: Estimator, aiding: FixAiding | RangeAiding, tracers: list[Tracer] | None) -> Estimator:
+    """The estimator or, where traces are asked for, one that takes it down."""
+    if tracers is None:
+        return estimator
+    tracers.append(Tracer(estimator, aiding.model, aiding.t_ns))
+    return tracers[-1]
+
+
 def _run_alone(
-    aiding: RangeAiding, method: Method, options: FilterOptions, recorder: Recorder, report: Callable[[int], None]
+    aiding: RangeAiding,
+    method: Method,
+    options: FilterOptions,
+    recorder: Recorder,
+    tracers: list[Tracer] | None,
+    report: Callable[[int], None],
 ) -> Rows:
     start_ns, state, cov = aiding.start_alone()
-    estimator = Updater(aiding, RangeGate(options.gate), aiding.model, method, recorder)
+    estimator = _traced(Updater(aiding, RangeGate(options.gate), aiding.model, method, recorder), aiding, tracers)
     epochs = np.flatnonzero(aiding.t_ns > start_ns)
     nodes = np.union1d(aiding.t_ns[epochs], _output_times(start_ns, int(aiding.t_ns[-1]), options.output_rate))
     return _run_epochs(

@@ -26,14 +26,15 @@ class Observed(NamedTuple):
 
 
 class Updated(NamedTuple):
-    """An epoch's outcome: state and cov (n, n), what they were before the measurement (clock jumps and inflation included), and
-    what became of it."""
+    """An epoch's outcome: state and cov (n, n), what they were before the measurement (clock jumps and inflation included),
+    what became of it, and what was observed."""
 
     state: NavState
     cov: Floats
     prior_state: NavState
     prior_cov: Floats
     status: RowStatus
+    observed: Observed
 
 
 class Verdict(Protocol):
@@ -120,9 +121,10 @@ class Updater:
 
     def update(self, epoch: int, state: NavState, cov: Floats, dtheta: Floats, dt: float) -> Updated:
         """The epoch of that index, from state and cov (n, n); dtheta (3,) [rad] and dt [s] are those of the step before it."""
-        measurement, state, cov = self._aiding.observe(epoch, state, cov, dtheta, dt)
+        observed = self._aiding.observe(epoch, state, cov, dtheta, dt)
+        measurement, state, cov = observed
         if measurement is None:
-            return Updated(state, cov, state, cov, RowStatus.PREDICTED)
+            return Updated(state, cov, state, cov, RowStatus.PREDICTED, observed)
         t_ns = int(self._aiding.t_ns[epoch])
         rule, adapter = self._method.rule, self._method.adapter
         prior = Gaussian(self._zero, cov)
@@ -143,14 +145,14 @@ class Updater:
         verdict.record(self._recorder, t_ns, measurement.kinds, innovation, noise)
         if not len(verdict.passed):
             self._leave(t_ns, labels, measurement.residual)
-            return Updated(state, cov, state, cov, RowStatus.REJECTED)
+            return Updated(state, cov, state, cov, RowStatus.REJECTED, observed)
         if len(verdict.passed) < len(noise):
             innovation = innovation.select(verdict.passed)
             noise = noise[verdict.passed[:, None], verdict.passed]
         posterior = rule.condition(adapted, innovation, noise)
         self._leave(t_ns, labels, measurement.residual - measurement.jacobian @ posterior.mean)
         moved = self._model.retract(state, posterior.mean)
-        return Updated(moved, posterior.cov, state, adapted.cov, RowStatus.UPDATED)
+        return Updated(moved, posterior.cov, state, adapted.cov, RowStatus.UPDATED, observed)
 
     def _leave(self, t_ns: int, labels: tuple[str, ...], residual: Floats) -> None:
         self._leftover = Leftover(t_ns, dict(zip(labels, residual.tolist(), strict=True)))

@@ -1,0 +1,35 @@
+"""What a method found of the noise in a whole log, as a configuration that the fixed filter can take over."""
+
+from math import pi
+
+from navreplay.solution import Solution
+from pipelines.spec import Config, apply_sets, dump_toml, validate
+
+__all__ = ["estimated_toml"]
+
+_DEG = pi / 180
+_UG = 9.80665e-6
+
+_KEYS = {
+    "position_noise_scale": ("gnss.position_noise_scale", 1.0),
+    "velocity_noise_scale": ("gnss.velocity_noise_scale", 1.0),
+    "pseudorange_noise_scale": ("range.pseudorange_noise_scale", 1.0),
+    "range_rate_noise_scale": ("range.range_rate_noise_scale", 1.0),
+    "gyro_noise": ("imu.gyro_noise_dps_rthz", _DEG),
+    "accel_noise": ("imu.accel_noise_ug_rthz", _UG),
+    "gyro_bias_walk": ("imu.gyro_bias_walk_dps_rts", _DEG),
+    "accel_bias_walk": ("imu.accel_bias_walk_mps2_rts", 1.0),
+    "horizontal": ("motion.horizontal", 1.0),
+    "vertical": ("motion.vertical", 1.0),
+}
+"""By name in the solution: the key and the SI value of its unit."""
+
+
+def estimated_toml(config: Config, solution: Solution) -> str:
+    """The configuration of a run with the figures that its method found, for the fixed filter."""
+    pairs = ((*_KEYS[name], value) for name, value in solution.estimated.items())
+    sets = [f"{key}={value / unit!r}" for key, unit, value in pairs]
+    data = config.model_dump(mode="json", exclude_none=True)
+    data["filter"] = {**data["filter"], "name": "fixed", "parameters": {}}
+    note = f"# Noise found by {solution.method} in this log; everything else as it was configured.\n"
+    return note + dump_toml(validate(apply_sets(data, sets), "config.estimated.toml"))
