@@ -10,7 +10,7 @@ from navreplay.atmosphere import klobuchar_delay, look_angles, saastamoinen_dela
 from navreplay.options import RangeOptions
 from navreplay.timeline import Floats, LogError, RangeSeries, Times
 
-__all__ = ["RangeEpochs", "arrange_ranges", "correct_ranges"]
+__all__ = ["RangeEpochs", "arrange_ranges", "clock_groups", "correct_ranges"]
 
 _WEEK_NS = 604_800_000_000_000
 _GPS_TIME = {"J": "G", "S": "G"}
@@ -79,7 +79,6 @@ def arrange_ranges(ranges: RangeSeries, options: RangeOptions) -> tuple[RangeEpo
     """
     starts = ranges.epoch_starts
     epoch = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
-    system = ranges.sat.astype("U1")
     weak = np.asarray(ranges.cn0 < options.cn0_mask)
     first = np.zeros(len(ranges), dtype=np.bool_)
     candidates = np.flatnonzero(~weak)
@@ -95,7 +94,7 @@ def arrange_ranges(ranges: RangeSeries, options: RangeOptions) -> tuple[RangeEpo
             f"ranges: all {len(ranges)} rows are weaker than {options.cn0_mask:g} dB-Hz; is the C/N0 in another unit? Lower "
             "range.cn0_mask_dbhz"
         )
-    offsets = [_GPS_TIME.get(letter, letter) for letter in system.tolist()]
+    offsets = clock_groups(ranges.sat)
     groups = tuple(dict.fromkeys(np.array(offsets)[first].tolist()))
     unknown = np.full(len(ranges), np.nan)
     everything = RangeEpochs(
@@ -116,6 +115,11 @@ def arrange_ranges(ranges: RangeSeries, options: RangeOptions) -> tuple[RangeEpo
         azimuth=unknown,
     )
     return everything.keep(first), {reason: count for reason, count in left_out.items() if count}
+
+
+def clock_groups(sat: NDArray[np.str_]) -> list[str]:
+    """(n,) letter of the constellation whose clock offset each satellite's range contains."""
+    return [_GPS_TIME.get(letter, letter) for letter in sat.astype("U1").tolist()]
 
 
 def _carriers(sat: NDArray[np.str_], signal: NDArray[np.str_]) -> Floats:

@@ -5,17 +5,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from navreplay.earth import ned_between
+from pipelines.plot import Plot, bend_of
 from pipelines.report import Report, build_report
-from pipelines.report_figures import Plot, bend_of, outage_shades
-from pipelines.report_tables import Figure, Table, figure_text
+from pipelines.report_figures import outage_shades
 from pipelines.result import RunResult
 from pipelines.svg import Layer, Panel, draw_map, draw_time_panels, map_height
+from pipelines.table import Figure, Table, figure_text
 
 __all__ = ["build_comparison", "comparison_figures", "comparison_plots", "comparison_tables"]
 
 _SCHEMA = "navreplay comparison 1"
 _COMMON = ("versions", "channels", "files", "assumptions", "damage", "findings", "configuration")
-_OWN = ("drive", "errors", "nees", "within_3_sigma", "nis", "innovations", "outages", "events", "timing_s")
+_OWN = ("drive", "errors", "nees", "within_3_sigma", "nis", "innovations", "satellites", "outages", "events", "timing_s")
 _STRETCHES = {"all": "whole drive", "outside": "outside outages", "inside": "inside outages"}
 _STYLES = tuple(f"c{number}" for number in range(1, 7))
 

@@ -10,12 +10,12 @@ import numpy as np
 from navreplay.timeline import Floats, LogError
 from pipelines.experiment import QUANTITIES, Experiment, Outcome
 from pipelines.experiment_summary import SETTLED, WHOLE, summarise_experiment
+from pipelines.plot import Plot
 from pipelines.report import Report, dump_json
-from pipelines.report_figures import Plot
 from pipelines.report_html import render_html
 from pipelines.report_markdown import render_markdown
-from pipelines.report_tables import Figure, Table, figure_text
 from pipelines.svg import Layer, Panel, draw_time_panels
+from pipelines.table import Figure, Table, figure_text
 from pipelines.whole_file import write_whole
 
 __all__ = ["experiment_figures", "experiment_plots", "experiment_tables", "write_experiment"]

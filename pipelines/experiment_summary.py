@@ -9,7 +9,8 @@ from scipy.special import chdtri, stdtrit
 
 from navreplay.timeline import Floats
 from pipelines.experiment import QUANTITIES, ArmOutcome, Experiment, OrderClaim, Outcome, Stretch
-from pipelines.report import Report, plain_data
+from pipelines.plain_data import plain_data
+from pipelines.report import Report
 
 __all__ = ["SETTLED", "WHOLE", "published_orders", "rmse_figures", "stretch_rows", "summarise_experiment"]
 

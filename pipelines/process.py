@@ -14,6 +14,7 @@ from importers.preflight import preflight
 from navreplay.filters.presets import build_method
 from navreplay.filters.run import run_filter
 from navreplay.metrics import evaluate, find_outages
+from navreplay.sky import view_sky
 from navreplay.solution import Solution
 from navreplay.timeline import Floats, GnssFixSeries, LogError, RangeSeries, Timeline
 from pipelines.outages import outage_windows, withhold_fixes, withhold_ranges
@@ -69,7 +70,8 @@ def filter_drive(drive: Drive, config: Config, progress: Progress | None = None)
     with _stage("evaluating", timing, progress):
         solution = replace(solution, outages=find_outages(solution, _simulated_windows(timeline, config)))
         evaluation = None if timeline.reference is None else evaluate(solution, timeline.reference, _reference_lever(timeline))
-    return RunResult(config, timeline, used, _at_output_point(solution, used, config), evaluation, drive.findings, timing)
+        sky = None if used.ranges is None else view_sky(used.ranges, solution)
+    return RunResult(config, timeline, used, _at_output_point(solution, used, config), evaluation, sky, drive.findings, timing)
 
 
 def _aiding(timeline: Timeline, config: Config) -> GnssFixSeries | RangeSeries | None:

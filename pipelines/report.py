@@ -4,7 +4,6 @@ import json
 import math
 import platform
 import re
-from collections.abc import Mapping
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
@@ -13,7 +12,6 @@ import numpy as np
 
 from navreplay.earth import ned_between
 from navreplay.metrics import (
-    Consistency,
     Evaluation,
     OutageErrors,
     Statistics,
@@ -27,6 +25,8 @@ from navreplay.outages import count_outages
 from navreplay.solution import InnovationSeries, Solution
 from navreplay.time_scales import week_tow_from_gps
 from navreplay.timeline import Provenance
+from pipelines.plain_data import plain_data
+from pipelines.report_satellites import describe_satellites
 from pipelines.result import RunResult
 from pipelines.solution_csv import utc_text
 
@@ -52,6 +52,7 @@ def build_report(result: RunResult) -> Report:
         "within_3_sigma": None if evaluation is None else plain_data(evaluation.within_3_sigma),
         "nis": {kind: plain_data(judged) for kind, judged in compute_nis(solution.innovations).items()},
         "innovations": {series.kind: _describe_innovations(series) for series in solution.innovations},
+        "satellites": None if result.sky is None else describe_satellites(result.sky, solution),
         "outages": {
             "count": len(outages),
             "counted": len(count_outages(outages)),
@@ -76,19 +77,6 @@ def outage_errors(result: RunResult) -> tuple[OutageErrors, ...]:
     if result.evaluation is not None:
         return result.evaluation.outages
     return assess_outages(result.solution, result.solution.outages or find_outages(result.solution))
-
-
-def plain_data(value: object) -> Any:
-    """Data classes and mappings as dictionaries, figures to nine digits, what is not finite as None."""
-    if isinstance(value, Statistics | Consistency):
-        return plain_data(asdict(value))
-    if isinstance(value, Mapping):
-        return {str(key): plain_data(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain_data(item) for item in value]
-    if isinstance(value, float):
-        return float(f"{value:.9g}") if math.isfinite(value) else None
-    return value
 
 
 def _versions() -> dict[str, str]:

@@ -1,7 +1,6 @@
 """The plots of a report: which series of a run go into which panels."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,27 +8,18 @@ from navreplay.earth import ned_between
 from navreplay.metrics import Evaluation
 from navreplay.rotation import euler_from_quat
 from navreplay.solution import InnovationSeries, Solution
-from navreplay.timeline import FixStatus, Floats, Timeline, Times
+from navreplay.timeline import FixStatus, Floats, Timeline
+from pipelines.plot import Legend, Plot, bend_of, elapsed_s, time_plot
 from pipelines.report import outage_errors
 from pipelines.result import RunResult
-from pipelines.svg import Layer, Panel, draw_map, draw_time_panels, map_height
+from pipelines.sky_figures import plot_satellites, plot_shared_noise, sky_plots
+from pipelines.svg import Layer, Panel, draw_map, map_height
 
-__all__ = ["Plot", "bend_of", "outage_shades", "report_plots"]
+__all__ = ["outage_shades", "report_plots"]
 
 _DPH = np.degrees(3600)
 _MG = 1 / 9.80665e-3
-Legend = tuple[tuple[str, str], ...]
 _FIX_NAMES = {status: status.name.lower().replace("_", " ") for status in FixStatus}
-
-
-@dataclass(frozen=True, slots=True)
-class Plot:
-    """A drawing with its title, what it shows in a sentence, and its legend: pairs of style class and name."""
-
-    title: str
-    note: str
-    legend: Legend
-    svg: str
 
 
 def report_plots(result: RunResult) -> tuple[Plot, ...]:
@@ -43,9 +33,13 @@ def report_plots(result: RunResult) -> tuple[Plot, ...]:
     else:
         plots.append(_plot_deviations(solution, shades))
     plots.append(_plot_attitude(solution, shades))
-    for series in solution.innovations:
-        if len(series.t_ns):
-            plots += [_plot_innovations(series, solution, shades), _plot_noise(series, solution, shades)]
+    if result.sky is not None:
+        plots += sky_plots(result.sky, solution, shades)
+    measured = [series for series in solution.innovations if len(series.t_ns)]
+    for series in measured:
+        noise = plot_shared_noise if series.sources else _plot_noise
+        plots += [_plot_innovations(series, solution, shades), noise(series, solution, shades)]
+    plots += [plot_satellites(series, solution, shades) for series in measured if series.sources]
     return (*plots, *_plot_biases(solution, shades))
 
 
@@ -54,33 +48,6 @@ def outage_shades(result: RunResult) -> tuple[tuple[float, float], ...]:
     origin = int(result.solution.t_ns[0])
     outages = [errors.outage for errors in outage_errors(result)]
     return tuple(((o.start_ns - origin) / 1e9, (o.end_ns - origin) / 1e9) for o in outages)
-
-
-def _elapsed(t_ns: Times, solution: Solution) -> Floats:
-    return np.asarray((t_ns - solution.t_ns[0]) / 1e9)
-
-
-def _time_plot(
-    title: str,
-    note: str,
-    legend: Legend,
-    panels: Sequence[Panel],
-    solution: Solution,
-    shades: Sequence[tuple[float, float]],
-    height: float | None = None,
-) -> Plot:
-    duration_s = float((solution.t_ns[-1] - solution.t_ns[0]) / 1e9)
-    return Plot(title, note, legend, draw_time_panels(panels, duration_s, shades, height))
-
-
-def bend_of(*series: Floats) -> float | None:
-    """Where a signed-logarithmic axis should begin; None where a linear one shows small and large values alike."""
-    magnitudes = np.abs(np.concatenate([values.ravel() for values in series]))
-    magnitudes = magnitudes[np.isfinite(magnitudes) & (magnitudes > 0)]
-    if len(magnitudes) == 0:
-        return None
-    usual, large = np.percentile(magnitudes, [50, 99.5])
-    return float(10 ** np.floor(np.log10(usual))) if large > 15 * usual else None
 
 
 def _plot_track(result: RunResult, layers: Sequence[Layer]) -> Plot:
@@ -139,21 +106,21 @@ def _rejected_fixes(result: RunResult) -> Floats:
 
 def _plot_motion(result: RunResult, shades: Sequence[tuple[float, float]], drawing_height: float) -> Plot:
     solution, timeline = result.solution, result.timeline
-    t = _elapsed(solution.t_ns, solution)
+    t = elapsed_s(solution.t_ns, solution)
     speed = np.linalg.norm(solution.vel_n, axis=1)
     height = [Layer("line", t, solution.lla[:, 2], "c1", "solution")]
     if timeline.reference is not None:
         reference = timeline.reference
         at = (reference.t_ns >= solution.t_ns[0]) & (reference.t_ns <= solution.t_ns[-1])
-        height.insert(0, Layer("line", _elapsed(reference.t_ns[at], solution), reference.lla[at, 2], "reference", "reference"))
+        height.insert(0, Layer("line", elapsed_s(reference.t_ns[at], solution), reference.lla[at, 2], "reference", "reference"))
     panels = [Panel("height [m]", tuple(height)), Panel("speed [m/s]", (Layer("line", t, speed, "c1", "solution"),))]
     legend = tuple((f"line {layer.style}", layer.name) for layer in height)
-    return _time_plot("Height and speed", "Height above the ellipsoid.", legend, panels, solution, shades, drawing_height)
+    return time_plot("Height and speed", "Height above the ellipsoid.", legend, panels, solution, shades, drawing_height)
 
 
 def _plot_errors(evaluation: Evaluation, solution: Solution, shades: Sequence[tuple[float, float]]) -> list[Plot]:
     plots = []
-    t = _elapsed(evaluation.t_ns, solution)
+    t = elapsed_s(evaluation.t_ns, solution)
     for quantity, series in evaluation.errors.items():
         factor, unit = (np.degrees(1.0), "deg") if series.unit == "rad" else (1.0, series.unit)
         error, envelope = series.error * factor, 3 * series.std * factor
@@ -171,12 +138,12 @@ def _plot_errors(evaluation: Evaluation, solution: Solution, shades: Sequence[tu
         ]
         note = "Estimated minus reference, with the 3-sigma envelope." + ("" if bend is None else " Signed logarithmic scale.")
         legend = (("line c1", "error"), ("band c1", "3 sigma"))
-        plots.append(_time_plot(f"{quantity.capitalize()} error", note, legend, panels, solution, shades))
+        plots.append(time_plot(f"{quantity.capitalize()} error", note, legend, panels, solution, shades))
     return plots
 
 
 def _plot_deviations(solution: Solution, shades: Sequence[tuple[float, float]]) -> Plot:
-    t, std = _elapsed(solution.t_ns, solution), solution.std
+    t, std = elapsed_s(solution.t_ns, solution), solution.std
     groups = (("position [m]", std[:, :3]), ("velocity [m/s]", std[:, 3:6]), ("attitude [deg]", np.degrees(std[:, 6:9])))
     styles = tuple(zip(("c1", "c2", "c3"), ("north", "east", "down"), strict=True))
     panels = [
@@ -187,20 +154,20 @@ def _plot_deviations(solution: Solution, shades: Sequence[tuple[float, float]]) 
     ]
     legend = tuple((f"line {style}", name) for style, name in styles)
     note = "No reference was given; this is what the filter believes of itself."
-    return _time_plot("Standard deviations", note, legend, panels, solution, shades)
+    return time_plot("Standard deviations", note, legend, panels, solution, shades)
 
 
 def _plot_attitude(solution: Solution, shades: Sequence[tuple[float, float]]) -> Plot:
-    t = _elapsed(solution.t_ns, solution)
+    t = elapsed_s(solution.t_ns, solution)
     angles = np.degrees(np.unwrap(euler_from_quat(solution.q_nb), axis=0))
     panels = [
         Panel(f"{name} [deg]", (Layer("line", t, angles[:, i], "c1", name),)) for i, name in enumerate(("roll", "pitch", "yaw"))
     ]
-    return _time_plot("Attitude", "Yaw is clockwise from north and counts on beyond a full turn.", (), panels, solution, shades)
+    return time_plot("Attitude", "Yaw is clockwise from north and counts on beyond a full turn.", (), panels, solution, shades)
 
 
 def _plot_innovations(series: InnovationSeries, solution: Solution, shades: Sequence[tuple[float, float]]) -> Plot:
-    t = _elapsed(series.t_ns, solution)
+    t = elapsed_s(series.t_ns, solution)
     used, refused = series.used, ~series.used
     panels = []
     for i, label in enumerate(series.labels):
@@ -218,30 +185,29 @@ def _plot_innovations(series: InnovationSeries, solution: Solution, shades: Sequ
     if not series.sources:
         legend = (*legend, ("band c1", "3 sigma"))
         note = "Measured minus predicted, with three standard deviations of their spread."
-    return _time_plot(f"Innovations: {series.kind}", note, legend, panels, solution, shades)
+    return time_plot(f"Innovations: {series.kind}", note, legend, panels, solution, shades)
 
 
 def _plot_noise(series: InnovationSeries, solution: Solution, shades: Sequence[tuple[float, float]]) -> Plot:
-    t = _elapsed(series.t_ns, solution)
-    kind = "dots" if series.sources else "line"
+    t = elapsed_s(series.t_ns, solution)
     panels = [
         Panel(
             f"{label} [{series.unit}]",
             (
-                Layer(kind, t, series.nominal_std[:, i], "reference", "told"),
-                Layer(kind, t, series.noise_std[:, i], "c2", "used"),
+                Layer("line", t, series.nominal_std[:, i], "reference", "told"),
+                Layer("line", t, series.noise_std[:, i], "c2", "used"),
             ),
             bend_of(series.noise_std, series.nominal_std),
         )
         for i, label in enumerate(series.labels)
     ]
-    legend = ((f"{kind} c2", "used by the filter"), (f"{kind} reference", "told by the receiver or the configuration"))
+    legend = (("line c2", "used by the filter"), ("line reference", "told by the receiver or the configuration"))
     note = "Standard deviation of the measurement noise."
-    return _time_plot(f"Noise: {series.kind}", note, legend, panels, solution, shades)
+    return time_plot(f"Noise: {series.kind}", note, legend, panels, solution, shades)
 
 
 def _plot_biases(solution: Solution, shades: Sequence[tuple[float, float]]) -> tuple[Plot, ...]:
-    t = _elapsed(solution.t_ns, solution)
+    t = elapsed_s(solution.t_ns, solution)
     plots = []
     for title, values, state, factor, unit in (
         ("Gyro bias", solution.gyro_bias, "gyro_bias_x", _DPH, "deg/h"),
@@ -257,5 +223,5 @@ def _plot_biases(solution: Solution, shades: Sequence[tuple[float, float]]) -> t
                 layers.insert(0, Layer("band", t, bias - std, "c3", "1 sigma", bias + std))
             panels.append(Panel(f"{axis} [{unit}]", tuple(layers)))
         legend = (("line c3", "estimate"), ("band c3", "1 sigma"))
-        plots.append(_time_plot(title, "Body axes.", legend, panels, solution, shades))
+        plots.append(time_plot(title, "Body axes.", legend, panels, solution, shades))
     return tuple(plots)

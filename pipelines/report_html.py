@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from importlib.resources import files
 
-from pipelines.report_figures import Plot
-from pipelines.report_tables import Figure, Table
+from pipelines.plot import Plot
+from pipelines.table import Figure, Table
 
 __all__ = ["render_html"]
 

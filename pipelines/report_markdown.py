@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from pipelines.report_tables import Figure, Table
+from pipelines.table import Figure, Table
 
 __all__ = ["render_markdown"]
 

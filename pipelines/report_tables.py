@@ -1,45 +1,16 @@
 """The tables of a report, taken from its plain data; Markdown and HTML only set them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from pipelines.report import Report
+from pipelines.satellite_tables import satellite_figure, satellite_tables
+from pipelines.table import Figure, Table, figure_text
 
-__all__ = ["Figure", "Table", "figure_text", "headline_figures", "report_tables"]
+__all__ = ["headline_figures", "report_tables"]
 
 _STRETCHES = {"all": "whole drive", "outside": "outside outages", "inside": "inside outages"}
 _STATISTICS = ("rms", "mean", "std", "p50", "p68", "p95", "max", "count")
-
-
-@dataclass(frozen=True, slots=True)
-class Figure:
-    """A headline figure: what it is, its value with unit, and a word of context (may be empty)."""
-
-    name: str
-    value: str
-    context: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class Table:
-    """A table of texts. note: one sentence below it (may be empty)."""
-
-    title: str
-    header: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    note: str = ""
-
-
-def figure_text(value: float | None, unit: str = "") -> str:
-    """A figure to three significant digits; a dash for an unknown one."""
-    if value is None:
-        return "–"
-    if isinstance(value, int):
-        text = str(value)
-    else:
-        text = f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}" if abs(value) >= 1e-3 or value == 0 else f"{value:.1e}"
-    return f"{text} {unit}".strip()
 
 
 def _duration_text(seconds: float) -> str:
@@ -69,6 +40,8 @@ def headline_figures(report: Report) -> tuple[Figure, ...]:
         nees = report["nees"]["position"]
         inside = f"3 expected; {_percent(nees['share_below_upper'])} below the 97.5 % bound"
         figures.append(Figure("Position NEES", figure_text(nees["mean"]), inside))
+    if report["satellites"] is not None:
+        figures.append(satellite_figure(report["satellites"]))
     counts = [(kind, innovation["used"], innovation["read"]) for kind, innovation in report["innovations"].items()]
     if counts:
         used, read = sum(count[1] for count in counts), sum(count[2] for count in counts)
@@ -107,6 +80,8 @@ def report_tables(report: Report) -> tuple[Table, ...]:
         tables.append(_coverage_table(report["within_3_sigma"]))
     if report["innovations"]:
         tables.append(_innovation_table(report["innovations"]))
+    if report["satellites"] is not None:
+        tables += satellite_tables(report["satellites"])
     tables.append(_channel_table(report["channels"]))
     tables += _text_tables(report)
     return tuple(tables)

@@ -11,7 +11,8 @@ Point = tuple[float, float, float]
 
 
 class Stack(NamedTuple):
-    """Plots of one quantity, one per label, one above the other. origin: entity under which the labels lie."""
+    """Plots of one quantity, one per label, one above the other. origin: entity under which the labels lie; without labels the
+    one plot is of all that lies under it. unit: may be empty."""
 
     name: str
     origin: str
@@ -20,21 +21,24 @@ class Stack(NamedTuple):
 
 
 def _arrange(stack: Stack, whole: rr.TimeRange) -> rrb.Vertical:
+    plots = [(label, f"{stack.origin}/{label}") for label in stack.labels] or [(stack.name, stack.origin)]
     views = [
         rrb.TimeSeriesView(
-            name=f"{label} [{stack.unit}]",
-            origin=f"{stack.origin}/{label}",
+            name=f"{name} [{stack.unit}]" if stack.unit else name,
+            origin=origin,
             axis_x=rrb.TimeAxis(view_range=whole),
             plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop),
         )
-        for label in stack.labels
+        for name, origin in plots
     ]
     return rrb.Vertical(contents=views, name=stack.name)
 
 
-def build_layout(stacks: tuple[Stack, ...], duration_s: float, eye: Point, target: Point, zoom: float) -> rrb.Blueprint:
+def build_layout(
+    stacks: tuple[Stack, ...], duration_s: float, eye: Point, target: Point, zoom: float, sky: bool
+) -> rrb.Blueprint:
     """duration_s: of the drive, all of which the plots show. eye, target [m]: where the 3-D view looks from and at, as east,
-    north, up. zoom: of the map, in web Mercator levels."""
+    north, up. zoom: of the map, in web Mercator levels. sky: whether there are satellites to show."""
     margin = 0.02 * duration_s
     whole = rr.TimeRange(
         start=rr.TimeRangeBoundary.absolute(seconds=-margin), end=rr.TimeRangeBoundary.absolute(seconds=duration_s + margin)
@@ -46,12 +50,16 @@ def build_layout(stacks: tuple[Stack, ...], duration_s: float, eye: Point, targe
         line_grid=rrb.LineGrid3D(visible=True),
     )
     chart = rrb.MapView(name="Map", origin="/map", zoom=zoom, background=rrb.MapProvider.OpenStreetMap)
+    bounds = rrb.VisualBounds2D(x_range=(-1.2, 1.2), y_range=(-1.2, 1.2))
+    overhead = (
+        [rrb.Spatial2DView(name="Sky (north up, horizon at the rim)", origin="/sky", visual_bounds=bounds)] if sky else []
+    )
     plots = rrb.Tabs(contents=[_arrange(stack, whole) for stack in stacks], active_tab=0, name="Plots")
     columns = [rrb.encodings.TextLogColumn(kind, visible=kind != "entitypath") for kind in ("entitypath", "loglevel", "body")]
     events = rrb.TextLogView(name="Events", origin="/events", columns=rrb.TextLogColumns(text_log_columns=columns))
     return rrb.Blueprint(
         rrb.Horizontal(
-            rrb.Vertical(track, chart, row_shares=[3, 2]),
+            rrb.Vertical(track, rrb.Horizontal(chart, *overhead), row_shares=[3, 2]),
             rrb.Vertical(plots, events, row_shares=[4, 1]),
             column_shares=[1, 1],
         ),

@@ -13,7 +13,9 @@ from navreplay.solution import Solution
 from navreplay.timeline import FixStatus, Floats
 from pipelines.report import outage_errors
 from pipelines.rerun_layout import build_layout
-from pipelines.rerun_series import list_stacks, send_biases, send_errors, send_innovations, time_columns
+from pipelines.rerun_paint import BLUE, GREY, PALE, RED, time_columns
+from pipelines.rerun_series import list_stacks, send_biases, send_errors, send_innovations
+from pipelines.rerun_sky import send_sky
 from pipelines.result import RunResult
 
 __all__ = ["recording_id", "write_recording"]
@@ -22,9 +24,8 @@ _APPLICATION = "navreplay"
 _ELLIPSOIDS = 200
 _ASPECT, _MAP_ASPECT = 1.5, 2.1
 """Width over height of the two views, for the track to fit into."""
-_BLUE, _GREY, _RED, _PALE = (88, 140, 255), (150, 160, 176), (235, 70, 70), (120, 135, 175)
 _FIX_COLORS = {
-    FixStatus.UNKNOWN: _GREY,
+    FixStatus.UNKNOWN: GREY,
     FixStatus.SINGLE: (235, 130, 40),
     FixStatus.DIFFERENTIAL: (220, 185, 50),
     FixStatus.FLOAT: (160, 110, 245),
@@ -56,6 +57,8 @@ def write_recording(path: Path, result: RunResult) -> None:
         _send_outage_tracks(recording, result, track)
         _send_ellipsoids(recording, solution, track)
         send_errors(recording, result)
+        if result.sky is not None:
+            send_sky(recording, result.sky, solution)
         send_innovations(recording, solution)
         send_biases(recording, solution)
         _send_events(recording, result)
@@ -74,22 +77,22 @@ def _layout(result: RunResult, track: Floats) -> Any:
     circumference = 2 * np.pi * SEMI_MAJOR_AXIS * np.cos(result.solution.lla[0, 0])
     zoom = np.clip(np.log2(circumference / (0.5 * max(wide, _MAP_ASPECT * tall))), 1, 18)
     duration_s = float(result.solution.t_ns[-1] - result.solution.t_ns[0]) / 1e9
-    return build_layout(list_stacks(result), duration_s, tuple(eye.tolist()), tuple(middle.tolist()), float(zoom))
+    return build_layout(
+        list_stacks(result), duration_s, tuple(eye.tolist()), tuple(middle.tolist()), float(zoom), result.sky is not None
+    )
 
 
 def _send_track(recording: rr.RecordingStream, solution: Solution, track: Floats) -> None:
     recording.log("/local", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    recording.log("/local/solution", rr.LineStrips3D([track], colors=_BLUE, radii=rr.Radius.ui_points(1.5)), static=True)
+    recording.log("/local/solution", rr.LineStrips3D([track], colors=BLUE, radii=rr.Radius.ui_points(1.5)), static=True)
     length = max(2.0, 0.04 * float(np.ptp(track[:, :2], axis=0).max()))
     recording.log("/local/body", rr.TransformAxes3D(axis_length=length), static=True)
     times = time_columns(solution.t_ns, solution)
     attitude = scalar_last_from_first(frd_ned_from_flu_enu(solution.q_nb))
     recording.send_columns("/local/body", indexes=times, columns=rr.Transform3D.columns(translation=track, quaternion=attitude))
     degrees = np.degrees(solution.lla[:, :2])
-    recording.log(
-        "/map/solution", rr.GeoLineStrings(lat_lon=[degrees], colors=_BLUE, radii=rr.Radius.ui_points(2)), static=True
-    )
-    recording.log("/map/position", rr.GeoPoints.from_fields(colors=_BLUE, radii=rr.Radius.ui_points(6)), static=True)
+    recording.log("/map/solution", rr.GeoLineStrings(lat_lon=[degrees], colors=BLUE, radii=rr.Radius.ui_points(2)), static=True)
+    recording.log("/map/position", rr.GeoPoints.from_fields(colors=BLUE, radii=rr.Radius.ui_points(6)), static=True)
     recording.send_columns("/map/position", indexes=times, columns=rr.GeoPoints.columns(positions=degrees))
 
 
@@ -100,8 +103,8 @@ def _send_reference_and_fixes(recording: rr.RecordingStream, result: RunResult, 
         lla = timeline.reference.lla[within]
         thin = rr.Radius.ui_points(1)
         degrees = np.degrees(lla[:, :2])
-        recording.log("/local/reference", rr.LineStrips3D([_local(origin, lla)], colors=_GREY, radii=thin), static=True)
-        recording.log("/map/reference", rr.GeoLineStrings(lat_lon=[degrees], colors=_GREY, radii=thin), static=True)
+        recording.log("/local/reference", rr.LineStrips3D([_local(origin, lla)], colors=GREY, radii=thin), static=True)
+        recording.log("/map/reference", rr.GeoLineStrings(lat_lon=[degrees], colors=GREY, radii=thin), static=True)
     fixes = result.used.fixes
     if fixes is None:
         return
@@ -123,12 +126,12 @@ def _send_outage_tracks(recording: rr.RecordingStream, result: RunResult, track:
     strips = [track[rows] for rows in inside if rows.sum() > 1]
     if strips:
         recording.log(
-            "/local/solution_in_outages", rr.LineStrips3D(strips, colors=_RED, radii=rr.Radius.ui_points(2)), static=True
+            "/local/solution_in_outages", rr.LineStrips3D(strips, colors=RED, radii=rr.Radius.ui_points(2)), static=True
         )
         degrees = [np.degrees(solution.lla[rows, :2]) for rows in inside if rows.sum() > 1]
         recording.log(
             "/map/solution_in_outages",
-            rr.GeoLineStrings(lat_lon=degrees, colors=_RED, radii=rr.Radius.ui_points(2.5)),
+            rr.GeoLineStrings(lat_lon=degrees, colors=RED, radii=rr.Radius.ui_points(2.5)),
             static=True,
         )
 
@@ -144,7 +147,7 @@ def _send_ellipsoids(recording: rr.RecordingStream, solution: Solution, track: F
         centers=track[rows],
         half_sizes=3 * np.sqrt(np.maximum(variances, 0)),
         quaternions=scalar_last_from_first(quat_from_matrix(axes)),
-        colors=_PALE,
+        colors=PALE,
         line_radii=rr.Radius.ui_points(0.5),
     )
     recording.log("/local/ellipsoids", ellipsoids, static=True)
@@ -152,8 +155,10 @@ def _send_ellipsoids(recording: rr.RecordingStream, solution: Solution, track: F
 
 def _send_events(recording: rr.RecordingStream, result: RunResult) -> None:
     solution = result.solution
-    rows = [(event.t_ns, event.level, event.text) for event in solution.events]
-    rows += [(int(solution.t_ns[0]), finding.level, finding.text) for finding in result.findings]
+    begin = int(solution.t_ns[0])
+    # the cursor opens at the first time there is, and that should be one with something to see
+    rows = [(max(event.t_ns, begin), event.level, event.text) for event in solution.events]
+    rows += [(begin, finding.level, finding.text) for finding in result.findings]
     for errors in outage_errors(result):
         end = "" if np.isnan(errors.end_horizontal) else f", horizontal error at its end {errors.end_horizontal:.2f} m"
         rows.append((errors.outage.start_ns, "info", f"outage of {errors.length_s:.1f} s ({errors.outage.cause}) begins{end}"))

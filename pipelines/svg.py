@@ -10,13 +10,16 @@ import numpy as np
 from navreplay.timeline import Floats
 from pipelines.scales import Scale, nice_ticks, thin_band, thin_line, time_label, time_ticks
 
-__all__ = ["Layer", "Panel", "draw_map", "draw_time_panels", "map_height"]
+__all__ = ["SKY_HEIGHT", "Layer", "Panel", "draw_map", "draw_sky", "draw_time_panels", "map_height"]
 
 _WIDTH = 520.0
 _LEFT, _RIGHT, _TOP, _BOTTOM = 66.0, 8.0, 9.0, 10.0
 _MAP_BOTTOM = 34.0
 _PANEL_HEIGHT, _GAP = 104.0, 12.0
 _MOST_DOTS = 4000
+_SKY_RADIUS, _SKY_MARGIN = 190.0, 22.0
+SKY_HEIGHT = 2 * (_SKY_RADIUS + _SKY_MARGIN)
+"""Of the drawing that `draw_sky` makes [px]."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -109,7 +112,7 @@ def _draw_panel(panel: Panel, across: Scale, shades: Sequence[tuple[float, float
     low, high = _extent(panel.layers)
     up = Scale(low, high, tall, panel.linear_to)
     parts = []
-    for tick in up.ticks(5):
+    for tick in up.ticks(min(5, max(2, round(tall / 20)))):
         y = top + tall - float(up.place(np.array(tick)))
         parts.append(f'<path class="grid" d="M{_LEFT} {y:.1f}H{_WIDTH - _RIGHT}"/>')
         parts.append(f'<text class="tick" x="{_LEFT - 5}" y="{y + 3.5:.1f}" text-anchor="end">{_number(tick)}</text>')
@@ -178,6 +181,26 @@ def draw_map(layers: Sequence[Layer], unit: str = "m") -> str:
     parts.append(f'<text class="label" transform="translate(11 {_TOP + tall / 2:.1f}) rotate(-90)">north [{unit}]</text>')
     parts.append(f'<text class="label" x="{_LEFT + inner / 2}" y="{height - 3:.1f}">east [{unit}]</text></svg>')
     return "".join(parts)
+
+
+def draw_sky(layers: Sequence[Layer], marks: Sequence[tuple[str, float, float]]) -> str:
+    """Layers over the hemisphere, seen from below with east on the right: x towards east and y towards north, 1 at the horizon.
+    marks: texts with their x and y."""
+    across = Scale(-1.0, 1.0, 2 * _SKY_RADIUS)
+    left = _WIDTH / 2 - _SKY_RADIUS
+    parts = [f'<svg class="plot map sky" viewBox="0 0 {_WIDTH:g} {SKY_HEIGHT:g}" role="img">']
+    centre = f'cx="{_WIDTH / 2}" cy="{_SKY_RADIUS + _SKY_MARGIN}"'
+    parts += [f'<circle class="grid" {centre} r="{_SKY_RADIUS * share:.1f}"/>' for share in (1 / 3, 2 / 3, 1)]
+    for name, east, north in (("N", 0, 1), ("E", 1, 0), ("S", 0, -1), ("W", -1, 0)):
+        x, y = _WIDTH / 2 + east * _SKY_RADIUS, (1 - north) * _SKY_RADIUS + _SKY_MARGIN
+        parts.append(f'<path class="grid" d="M{_WIDTH / 2} {_SKY_RADIUS + _SKY_MARGIN}L{x} {y}"/>')
+        parts.append(f'<text class="label" x="{x + 10 * east}" y="{y - 8 * north + 4}">{name}</text>')
+    parts.append(f'<svg x="{left}" y="{_SKY_MARGIN}" width="{across.pixels}" height="{across.pixels}" overflow="visible">')
+    parts += [_draw_layer(layer, across, across, x_ordered=False) for layer in layers]
+    for text, x, y in marks:
+        px, py = across.place(np.array([x, -y])).tolist()
+        parts.append(f'<text class="mark" x="{px:.1f}" y="{py - 5:.1f}">{escape(text)}</text>')
+    return "".join([*parts, "</svg></svg>"])
 
 
 def _map_scales(layers: Sequence[Layer]) -> tuple[Scale, Scale]:

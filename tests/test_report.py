@@ -13,9 +13,10 @@ from navreplay.timeline import LogError
 from pipelines.comparison import build_comparison
 from pipelines.outputs import label_methods, write_comparison, write_outputs
 from pipelines.report import build_report, dump_json
-from pipelines.report_tables import figure_text, headline_figures, report_tables
+from pipelines.report_tables import headline_figures, report_tables
 from pipelines.result import RunResult
 from pipelines.sections import OutputSection
+from pipelines.table import figure_text
 from tests.sample_drive import make_result, make_solution
 
 NASTY = "/gps/<script>alert('x')</script>|&"

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipelines.report_figures import bend_of
+from pipelines.plot import bend_of
 from pipelines.scales import Scale, nice_ticks, thin_band, thin_line, time_label, time_ticks
 from pipelines.svg import Layer, Panel, draw_map, draw_time_panels
 
