@@ -7,6 +7,7 @@ from typing import Literal
 __all__ = [
     "GRADES",
     "AlignmentOptions",
+    "ConsiderOptions",
     "FilterOptions",
     "GapOptions",
     "GateOptions",
@@ -139,6 +140,25 @@ class MotionOptions:
 
 
 @dataclass(frozen=True, slots=True)
+class ConsiderOptions:
+    """Unknown constant biases that a filter reckons with but does not estimate: standard deviations, NED where there are three,
+    0 where there is none.
+
+    In the measurements: position_bias [m] and velocity_bias [m/s], as if the antenna were displaced by one and drifted with the
+    other, of fixes as of ranges (along each line of sight); zenith_delay [m] of pseudoranges, divided by the sine of the
+    elevation. In the dynamics: position_rate [m/s] and velocity_rate [m/s^2] add to the derivatives of position and velocity.
+    every_method: reckon with them in every method, not in those alone that are made for it.
+    """
+
+    position_bias: tuple[float, float, float] = (1.0, 1.0, 2.0)
+    velocity_bias: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    zenith_delay: float = 0.0
+    position_rate: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    velocity_rate: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    every_method: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class FilterOptions:
     """Everything a filter run is told beside the timeline and the method.
 
@@ -177,3 +197,4 @@ class FilterOptions:
     smooth: bool = False
     ranges: RangeOptions = RangeOptions()
     motion: MotionOptions = MotionOptions()
+    consider: ConsiderOptions = ConsiderOptions()

@@ -10,6 +10,7 @@ from navreplay.adapt.adapter import NoiseAdapter
 from navreplay.alignment import align
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.filters.calibration import settle_nothing
+from navreplay.filters.consider import Setup, set_up
 from navreplay.filters.fix_aiding import FixAiding
 from navreplay.filters.gate import Gate
 from navreplay.filters.linear_log import LinearLog
@@ -20,7 +21,7 @@ from navreplay.filters.record import Recorder
 from navreplay.filters.rows import Rows
 from navreplay.filters.stretches import cut_at_gaps, tell_unreached
 from navreplay.filters.trace import Tracer
-from navreplay.filters.update import Estimator, Updater
+from navreplay.filters.update import Estimator
 from navreplay.heading import Sources
 from navreplay.options import FilterOptions
 from navreplay.solution import Event, Solution
@@ -65,16 +66,18 @@ def _run_passes(
     name = f"{method.name}-smoothed" if options.smooth else method.name
     if timeline.imu is None:
         alone = _choose_ranges_alone(timeline, options, recorder)
-        rows = [_run_alone(alone, method, options, recorder, tracers, _report_of(alone.t_ns, progress))]
-        return _join(rows, f"{name} without IMU", alone.model, recorder)
+        setup = set_up(alone, method, options)
+        rows = [_run_alone(alone, setup, options, recorder, tracers, _report_of(alone.t_ns, progress))]
+        return _join(rows, f"{name} without IMU", setup.model, recorder)
     aiding = _choose_aiding(timeline, options, recorder)
+    setup = set_up(aiding, method, options)
     stretches = cut_at_gaps(timeline.imu, options.gaps, recorder)
     tell_unreached(aiding.t_ns, aiding.name, stretches, recorder)
     report = _report_of(timeline.imu.t_ns, progress)
     rows = []
     for stretch in stretches:
         try:
-            rows.append(_run_stretch(timeline, aiding, stretch, method, options, recorder, tracers, report))
+            rows.append(_run_stretch(timeline, aiding, stretch, setup, options, recorder, tracers, report))
         except LogError as error:
             if len(stretches) == 1:
                 raise
@@ -83,7 +86,7 @@ def _run_passes(
         report(int(stretch.t_ns[-1]))
     if not rows:
         raise LogError("filter: no stretch of the IMU could be aligned; see the gaps that `navreplay inspect` shows")
-    return _join(rows, name, aiding.model, recorder)
+    return _join(rows, name, setup.model, recorder)
 
 
 def _report_of(t_ns: Times, progress: Progress | None) -> Callable[[int], None]:
@@ -142,7 +145,7 @@ def _run_stretch(
     timeline: Timeline,
     aiding: FixAiding | RangeAiding,
     imu: ImuSeries,
-    method: Method,
+    setup: Setup,
     options: FilterOptions,
     recorder: Recorder,
     tracers: list[Tracer] | None,
@@ -154,11 +157,12 @@ def _run_stretch(
         recorder.tell(start.t_ns, "warning", warning)
     state, cov = aiding.start(start)
     gate = Gate(options.gate) if isinstance(aiding, FixAiding) else RangeGate(options.gate)
-    estimator = _traced(Updater(aiding, gate, aiding.model, method, recorder), aiding, tracers)
+    estimator = _traced(setup.estimator(gate, recorder), aiding, tracers)
     epochs = np.flatnonzero((aiding.t_ns > start.t_ns) & (aiding.t_ns <= imu.t_ns[-1]))
     nodes = np.union1d(aiding.t_ns[epochs], _output_times(start.t_ns, int(imu.t_ns[-1]), options.output_rate))
     steps = make_steps(imu, np.append(nodes, start.t_ns)).after(start.t_ns)
-    return _run_epochs(steps, nodes, aiding.t_ns, epochs, state, cov, estimator, aiding.model, options, report)
+    cov = setup.start_covariance(cov)
+    return _run_epochs(steps, nodes, aiding.t_ns, epochs, state, cov, estimator, setup.model, options, report)
 
 
 def _traced(estimator: Estimator, aiding: FixAiding | RangeAiding, tracers: list[Tracer] | None) -> Estimator:
@@ -171,19 +175,18 @@ def _traced(estimator: Estimator, aiding: FixAiding | RangeAiding, tracers: list
 
 def _run_alone(
     aiding: RangeAiding,
-    method: Method,
+    setup: Setup,
     options: FilterOptions,
     recorder: Recorder,
     tracers: list[Tracer] | None,
     report: Callable[[int], None],
 ) -> Rows:
     start_ns, state, cov = aiding.start_alone()
-    estimator = _traced(Updater(aiding, RangeGate(options.gate), aiding.model, method, recorder), aiding, tracers)
+    estimator = _traced(setup.estimator(RangeGate(options.gate), recorder), aiding, tracers)
     epochs = np.flatnonzero(aiding.t_ns > start_ns)
     nodes = np.union1d(aiding.t_ns[epochs], _output_times(start_ns, int(aiding.t_ns[-1]), options.output_rate))
-    return _run_epochs(
-        idle_steps(start_ns, nodes), nodes, aiding.t_ns, epochs, state, cov, estimator, aiding.model, options, report
-    )
+    cov, steps = setup.start_covariance(cov), idle_steps(start_ns, nodes)
+    return _run_epochs(steps, nodes, aiding.t_ns, epochs, state, cov, estimator, setup.model, options, report)
 
 
 def _run_epochs(
