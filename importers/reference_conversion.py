@@ -64,7 +64,7 @@ def convert_attitude(joined: Joined, settings: AttitudeInput) -> tuple[AttitudeS
     if len(order) == 0:
         raise LogError(f"{joined.name}: none of its {len(q)} attitudes is usable: {screening.rejected(slice(None))}")
     unknown = np.full((len(order), 3, 3), np.nan)
-    series = AttitudeSeries(joined.t_ns[order], q[order], unknown, settings.heading_only)
+    series = AttitudeSeries(joined.t_ns[order], q[order], unknown, heading_only=settings.heading_only)
     return series, account(joined, screening), (*joined.notes, *screening.notes)
 
 

@@ -18,10 +18,8 @@ from navreplay import earth
 _A = earth.SEMI_MAJOR_AXIS
 _E2 = earth.ECCENTRICITY_SQUARED
 _RATE = earth.EARTH_RATE
-_F = earth.FLATTENING
-_M = earth.GRAVITY_RATIO
-_GE = earth.GRAVITY_EQUATOR
-_K = earth.SOMIGLIANA_K
+_GM = earth.GM
+_attract = njit(cache=True)(earth.attract)
 
 BRIDGE_ACCEL = 1.0
 """Specific force [m/s^2] and angular rate [rad/s] that may go unseen while a gap of the IMU is bridged: standard deviations."""
@@ -69,8 +67,9 @@ def _fill_matrix(w, x, y, z, c):
 def _step(x, dt, dtheta, dvel, c, dv_n, body):
     """Moves x over one step. c: C_nb, at its start on entry, at its end on return. dv_n: specific force integral in n. body:
     the step's corrected rotation (3) and velocity increment (3), for the scale-factor columns."""
-    lat, height = x[0], x[2]
     vn, ve, vd = x[3], x[4], x[5]
+    # place in the middle of the step, for gravity and the rates of the frames
+    lat, height = x[0] + 0.5 * vn * dt / _A, x[2] - 0.5 * vd * dt
     tx = (dtheta[0] - (x[10] + x[22]) * dt) / (1 + x[16])
     ty = (dtheta[1] - (x[11] + x[23]) * dt) / (1 + x[17])
     tz = (dtheta[2] - (x[12] + x[24]) * dt) / (1 + x[18])
@@ -89,16 +88,21 @@ def _step(x, dt, dtheta, dvel, c, dv_n, body):
 
     sine, cosine = math.sin(lat), math.cos(lat)
     w2 = 1 - _E2 * sine * sine
-    root = math.sqrt(w2)
-    normal = _A / root
+    normal = _A / math.sqrt(w2)
     meridian = normal * (1 - _E2) / w2
-    ratio = height / _A
-    g = _GE * (1 + _K * sine * sine) / root * (1 - 2 * (1 + _F + _M - 2 * _F * sine * sine) * ratio + 3 * ratio * ratio)
+    across, along = (normal + height) * cosine, (normal * (1 - _E2) + height) * sine
+    outward, northward = _attract(across, along, math.sqrt(across * across + along * along))
+    outward += _RATE * _RATE * across
+    gn, gd = northward * cosine - outward * sine, -outward * cosine - northward * sine
+    ien, ied, tangent = _RATE * cosine, -_RATE * sine, sine / cosine
     # velocity in the middle of the step, for Coriolis and transport
-    mn, me, md = vn + 0.5 * fx, ve + 0.5 * fy, vd + 0.5 * (fz + g * dt)
-    ien, ied = _RATE * cosine, -_RATE * sine
+    east = ve / (normal + height)
+    rx, ry, rz = 2 * ien + east, -vn / (meridian + height), 2 * ied - east * tangent
+    mn = vn + 0.5 * (fx + (gn - (ry * vd - rz * ve)) * dt)
+    me = ve + 0.5 * (fy - (rz * vn - rx * vd) * dt)
+    md = vd + 0.5 * (fz + (gd - (rx * ve - ry * vn)) * dt)
     east = me / (normal + height)
-    enn, ene, end = east, -mn / (meridian + height), -east * sine / cosine
+    enn, ene, end = east, -mn / (meridian + height), -east * tangent
     zx, zy, zz = (ien + enn) * dt, ene * dt, (ied + end) * dt
     # rotation of the navigation frame during the step
     gx = fx - 0.5 * (zy * fz - zz * fy)
@@ -106,15 +110,13 @@ def _step(x, dt, dtheta, dvel, c, dv_n, body):
     gz = fz - 0.5 * (zx * fy - zy * fx)
     dv_n[0], dv_n[1], dv_n[2] = gx, gy, gz
     rx, ry, rz = 2 * ien + enn, ene, 2 * ied + end
-    new_n = vn + gx - (ry * md - rz * me) * dt
+    new_n = vn + gx + (gn - (ry * md - rz * me)) * dt
     new_e = ve + gy - (rz * mn - rx * md) * dt
-    new_d = vd + gz + (g - (rx * me - ry * mn)) * dt
+    new_d = vd + gz + (gd - (rx * me - ry * mn)) * dt
 
-    middle = height - 0.25 * (vd + new_d) * dt
-    new_lat = lat + 0.5 * (vn + new_n) * dt / (meridian + middle)
-    x[1] += 0.5 * (ve + new_e) * dt / ((normal + middle) * math.cos(0.5 * (lat + new_lat)))
-    x[0] = new_lat
-    x[2] = height - 0.5 * (vd + new_d) * dt
+    x[1] += 0.5 * (ve + new_e) * dt / ((normal + height) * cosine)
+    x[0] += 0.5 * (vn + new_n) * dt / (meridian + height)
+    x[2] -= 0.5 * (vd + new_d) * dt
     x[3], x[4], x[5] = new_n, new_e, new_d
 
     pw, px, py, pz = _small_rotation(tx, ty, tz)
@@ -214,7 +216,7 @@ def _fill_rate_matrix(x, span, c_dt, dv_n, c_theta, c_dvel, a):
     sn, se, sd = den_n_down, den_e_down, den_d_down
     a[3, 2] = -(se * vd - sd * ve) * span
     a[4, 2] = -(sd * vn - sn * vd) * span
-    a[5, 2] = -(sn * ve - se * vn) * span + 2 * 9.81 / math.sqrt(rm * rn) * span
+    a[5, 2] = -(sn * ve - se * vn) * span + 2 * _GM / (rm * rn * math.sqrt(rm * rn)) * span
     # ... then with velocity: -(2 ie + en) x dv - (den x v)
     wx, wy, wz = 2 * ien + enn, ene, 2 * ied + end
     a[3, 3] = vd / rm * span

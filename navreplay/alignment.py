@@ -142,8 +142,7 @@ def _level_in_motion(sources: Sources, first: int, rows: np.ndarray, weights: Fl
     else:
         own = np.concatenate([np.zeros((1, 3)), earth.ned_between(lla, states[at, 0:3])])
         seen = weights @ earth.ned_between(lla, fixes.lla[rows])
-    gravity = np.array([0.0, 0.0, float(earth.gravity(lla[0], lla[2]))])
-    force = weights @ own - gravity
+    force = weights @ own - earth.gravity_n(lla[0], lla[2])
     roll, pitch = level(force)
     for _ in range(10):
         push = rotation.matrix_from_euler(roll, pitch, yaw).T @ seen

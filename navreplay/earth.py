@@ -1,8 +1,9 @@
 """WGS-84: ellipsoid, normal gravity, rates of the navigation frame, geodetic / Earth-fixed / local coordinates.
 
-Constants and the gravity formula: NGA.STND.0036 (WGS 84, version 1.0.0, 2014). Latitude and longitude [rad], height above
-the ellipsoid [m], Earth-fixed coordinates [m]; everything broadcasts over leading dimensions, and single points, of which
-every measurement epoch has some, go by plain floats.
+Constants: NGA.STND.0036 (WGS 84, version 1.0.0, 2014). Normal gravity: Hofmann-Wellenhof and Moritz, Physical Geodesy (2005),
+2.9; from the depths of mines to space. Latitude and longitude [rad], height above the ellipsoid [m], Earth-fixed coordinates
+[m]; everything broadcasts over leading dimensions, and single points, of which every measurement epoch has some, go by plain
+floats.
 """
 
 import math
@@ -18,18 +19,20 @@ __all__ = [
     "ECCENTRICITY_SQUARED",
     "FLATTENING",
     "GM",
-    "GRAVITY_EQUATOR",
-    "GRAVITY_RATIO",
     "SEMI_MAJOR_AXIS",
-    "SOMIGLIANA_K",
+    "attract",
     "earth_rate_n",
     "ecef_from_lla",
+    "frame_turn_n",
+    "gravitation",
     "gravity",
+    "gravity_n",
     "lla_from_ecef",
     "matrix_en",
     "move_lla",
     "ned_between",
     "offset_between",
+    "quat_en",
     "radii",
     "transport_rate_n",
 ]
@@ -42,12 +45,8 @@ EARTH_RATE = 7.292115e-5
 """Rotation rate [rad/s]."""
 GM = 3.986004418e14
 """Gravitational constant times the Earth's mass [m^3/s^2]."""
-GRAVITY_EQUATOR = 9.7803253359
-"""Normal gravity on the equator [m/s^2]."""
-SOMIGLIANA_K = 1.931852652458e-3
-GRAVITY_RATIO = EARTH_RATE**2 * SEMI_MAJOR_AXIS**3 * (1 - FLATTENING) / GM
-"""The m = omega^2 a^2 b / GM of the height terms."""
-
+_J2, _J4, _J6 = 1.08262982131e-3, -2.37091120053e-6, 6.08346498882e-9
+"""Zonal coefficients of the normal field; what follows is below 2e-9 m/s^2."""
 _SEMI_MINOR_AXIS = SEMI_MAJOR_AXIS * (1 - FLATTENING)
 
 
@@ -67,14 +66,58 @@ def _sine_cosine(angle: ArrayLike) -> tuple[Any, Any]:
     return np.sin(angle), np.cos(angle)
 
 
-def gravity(lat: ArrayLike, height: ArrayLike) -> Floats:
-    """Normal gravity, positive down [m/s^2]: Somigliana on the ellipsoid, second order in height (NGA.STND.0036, 4-1, 4-3)."""
+def attract(across: Any, along: Any, distance: Any) -> tuple[Any, Any]:
+    """Normal gravitation of the Earth, without the centrifugal part, away from its axis and along it (northward) [m/s^2].
+
+    across [m]: distance from the axis. along [m]: northward from the equatorial plane. distance [m]: from the centre.
+    Gradient of the zonal harmonics to degree 6, with t = along / distance:
+    d/dz r^-(n+1) P_n(t) = -(n+1) r^-(n+2) P_n+1(t), and across the axis -across r^-(n+3) P'_n+1(t).
+    Plain arithmetic, for numbers as for arrays: `_kernels` compiles it.
+    """
+    t = along / distance
+    t2 = t * t
+    ratio2 = (SEMI_MAJOR_AXIS / distance) * (SEMI_MAJOR_AXIS / distance)
+    j2, j4, j6 = _J2 * ratio2, _J4 * ratio2 * ratio2, _J6 * ratio2 * ratio2 * ratio2
+    outward = (
+        1
+        - j2 * (15 * t2 - 3) / 2
+        - j4 * ((315 * t2 - 210) * t2 + 15) / 8
+        - j6 * (((3003 * t2 - 3465) * t2 + 945) * t2 - 35) / 16
+    )
+    northward = (
+        1
+        - 3 * j2 * (5 * t2 - 3) / 2
+        - 5 * j4 * ((63 * t2 - 70) * t2 + 15) / 8
+        - 7 * j6 * (((429 * t2 - 693) * t2 + 315) * t2 - 35) / 16
+    )
+    central = -GM / (distance * distance * distance)
+    return central * across * outward, central * along * northward
+
+
+def gravitation(r: Floats) -> Floats:
+    """Normal gravitation (..., 3) [m/s^2] at r (..., 3) [m] from the Earth's centre, in any axes whose z is the Earth's."""
+    across = np.hypot(r[..., 0], r[..., 1])
+    outward, northward = attract(across, r[..., 2], np.hypot(across, r[..., 2]))
+    share = outward / across
+    return np.stack([share * r[..., 0], share * r[..., 1], northward], axis=-1)
+
+
+def gravity_n(lat: ArrayLike, height: ArrayLike) -> Floats:
+    """Normal gravity in NED [m/s^2], (..., 3): gravitation and centrifugal force; on the ellipsoid it points straight down."""
     lat = np.asarray(lat, dtype=np.float64)
     height = np.asarray(height, dtype=np.float64)
-    s2 = np.sin(lat) ** 2
-    on_ellipsoid = GRAVITY_EQUATOR * (1 + SOMIGLIANA_K * s2) / np.sqrt(1 - ECCENTRICITY_SQUARED * s2)
-    ratio = height / SEMI_MAJOR_AXIS
-    return np.asarray(on_ellipsoid * (1 - 2 * (1 + FLATTENING + GRAVITY_RATIO - 2 * FLATTENING * s2) * ratio + 3 * ratio**2))
+    sine, cosine = np.sin(lat), np.cos(lat)
+    _, normal = radii(lat)
+    across, along = (normal + height) * cosine, (normal * (1 - ECCENTRICITY_SQUARED) + height) * sine
+    outward, northward = attract(across, along, np.hypot(across, along))
+    outward = outward + EARTH_RATE**2 * across
+    north = northward * cosine - outward * sine
+    return np.stack([north, np.zeros_like(north), -outward * cosine - northward * sine], axis=-1)
+
+
+def gravity(lat: ArrayLike, height: ArrayLike) -> Floats:
+    """Normal gravity, positive down [m/s^2]: the vertical part of `gravity_n`."""
+    return np.asarray(gravity_n(lat, height)[..., 2])
 
 
 def earth_rate_n(lat: ArrayLike) -> Floats:
@@ -139,11 +182,27 @@ def matrix_en(lat: ArrayLike, lon: ArrayLike) -> Floats:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
+def frame_turn_n(lla: Floats) -> Floats:
+    """(3, 3) the small rotation of NED [rad] that a small offset [m, NED] at lla (3,) brings about: dE / R_N, -dN / R_M,
+    -dE tan(lat) / R_N."""
+    meridian, normal = radii(lla[0])
+    east, north = 1 / (normal + lla[2]), 1 / (meridian + lla[2])
+    return np.array([[0.0, east, 0.0], [-north, 0.0, 0.0], [0.0, -east * np.tan(lla[0]), 0.0]])
+
+
 def ned_between(origin_lla: Floats, lla: Floats) -> Floats:
     """Vector from origin_lla (..., 3) to lla (..., 3) in NED at the origin [m], (..., 3); exact (through Earth-fixed)."""
     origin_lla = np.asarray(origin_lla, dtype=np.float64)
     difference = ecef_from_lla(lla) - ecef_from_lla(origin_lla)
     return np.asarray(np.einsum("...ji,...j->...i", matrix_en(origin_lla[..., 0], origin_lla[..., 1]), difference))
+
+
+def quat_en(lat: ArrayLike, lon: ArrayLike) -> Floats:
+    """Quaternion (..., 4), scalar first, of `matrix_en`: about the axis by longitude, then about east to the local vertical."""
+    half_lon = np.asarray(lon, dtype=np.float64) / 2
+    half_tilt = -(np.asarray(lat, dtype=np.float64) / 2 + np.pi / 4)
+    co, so, ct, st = np.cos(half_lon), np.sin(half_lon), np.cos(half_tilt), np.sin(half_tilt)
+    return np.stack([co * ct, -so * st, co * st, so * ct], axis=-1)
 
 
 def move_lla(lla: Floats, offset_n: Floats) -> Floats:

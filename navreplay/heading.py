@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from navreplay import earth, rotation
+from navreplay.attitude_measurements import attitude_nb
 from navreplay.ground_motion import fix_velocity
 from navreplay.options import AlignmentOptions, ImuNoise
 from navreplay.strapdown import NavState, integrate_steps, make_steps
@@ -53,22 +54,28 @@ def known_heading(sources: Sources, t_ns: int) -> Heading | None:
         known = np.zeros(0, dtype=bool) if reference is None else np.isfinite(reference.q_nb).all(axis=1)
         if reference is None or not known.any():
             raise LogError("alignment: method is 'reference', but the reference holds no attitude; choose another")
-        return Heading(_nearest_yaw(t_ns, reference.t_ns[known], reference.q_nb[known]), told_std, "the reference")
+        row = _nearest(t_ns, reference.t_ns[known])
+        return Heading(float(rotation.euler_from_quat(reference.q_nb[known][row])[2]), told_std, "the reference")
     attitude = sources.attitude
     if attitude is None and options.method == "attitude":
         raise LogError("alignment: method is 'attitude', but the log holds no attitude; set input.attitude.channel")
     if attitude is None or options.method not in ("auto", "attitude"):
         return None
-    variance = float(attitude.cov[int(np.argmin(np.abs(attitude.t_ns - t_ns))), 2, 2])
+    row = _nearest(t_ns, attitude.t_ns)
+    nearest_fix = int(
+        np.argmin(np.where(sources.fixes.has_position, np.abs(sources.fixes.t_ns - t_ns), np.iinfo(np.int64).max))
+    )
+    q_nb, c_nf = attitude_nb(attitude, row, sources.fixes.lla[nearest_fix])
+    variance = float(c_nf[2] @ attitude.cov[row] @ c_nf[2])
     std = float(np.sqrt(variance)) if np.isfinite(variance) else told_std
-    return Heading(_nearest_yaw(t_ns, attitude.t_ns, attitude.q_nb), std, "the attitude channel")
+    return Heading(float(rotation.euler_from_quat(q_nb)[2]), std, "the attitude channel")
 
 
-def _nearest_yaw(t_ns: int, times: Times, q_nb: Floats) -> float:
+def _nearest(t_ns: int, times: Times) -> int:
     nearest = int(np.argmin(np.abs(times - t_ns)))
     if abs(int(times[nearest]) - t_ns) > _NEAR_NS:
         raise LogError("alignment: no attitude within 2 s of the first fix; choose another alignment.method")
-    return float(rotation.euler_from_quat(q_nb[nearest])[2])
+    return nearest
 
 
 def gyrocompass(sources: Sources, gyro: Floats, gyro_std: float, roll: float, pitch: float, lat: float) -> Heading | None:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from navreplay.earth import move_lla, ned_between
+from navreplay.earth import frame_turn_n, move_lla, ned_between, quat_en
 from navreplay.outages import OutageErrors, assess_outages, find_outages, mark_unaided, summarise_outages
 from navreplay.rotation import matrix_from_quat, quat_conjugate, quat_from_rotvec, quat_multiply, rotvec_from_quat, skew
 from navreplay.solution import Solution
@@ -54,7 +54,9 @@ class ErrorSeries:
 class Evaluation:
     """A solution judged by a reference, at the k reference epochs that the solution covers.
 
-    t_ns: (k,). errors: by quantity: position, and velocity and attitude where the reference knows them. in_outage: (k,)
+    t_ns: (k,). errors: by quantity: position, and velocity and attitude where the reference knows them; where attitudes were
+    measured also inertial_attitude, against Earth-fixed axes (and so the stars) but resolved in NED, of which the position is
+    no part as it is of attitude, NED turning with it. in_outage: (k,)
     bool, see `mark_unaided`. statistics: by stretch (all, outside, inside outages), quantity and component (the labels;
     horizontal and 3d for position and velocity). nees: by quantity. within_3_sigma: share of errors by quantity and label
     (0.9973 expected).
@@ -148,6 +150,18 @@ def _measure_errors(at: Interpolated, reference: Trajectory, lever_b: Floats) ->
     return errors
 
 
+def _inertial_attitude(at: Interpolated, reference: Trajectory) -> ErrorSeries:
+    """Rotation vector from the reference's attitude in Earth-fixed axes to the estimated one, in NED at the reference."""
+    q_en = quat_en(reference.lla[:, 0], reference.lla[:, 1])
+    estimated = quat_multiply(quat_en(at.lla[:, 0], at.lla[:, 1]), at.q_nb)
+    error_e = rotvec_from_quat(quat_multiply(estimated, quat_conjugate(quat_multiply(q_en, reference.q_nb))))
+    error = np.einsum("kji,kj->ki", matrix_from_quat(q_en), error_e)
+    turn = np.array([frame_turn_n(lla) for lla in at.lla])
+    mixed = turn @ at.cov[:, :3, 6:9]
+    cov = at.cov[:, 6:9, 6:9] + mixed + np.swapaxes(mixed, 1, 2) + turn @ at.cov[:, :3, :3] @ np.swapaxes(turn, 1, 2)
+    return _series(_ATTITUDE_AXES, "rad", error, cov)
+
+
 def _cov_at(cov: Floats, block: slice, moved: Floats) -> Floats:
     """Covariance (k, 3, 3) of a block of states plus phi x moved, the error of a vector that turns with the attitude."""
     cross = -skew(moved)
@@ -162,7 +176,7 @@ def _summarise_errors(errors: Mapping[str, ErrorSeries], rows: NDArray[np.bool_]
     for quantity, series in errors.items():
         error = series.error[rows]
         table = {label: summarise(error[:, i]) for i, label in enumerate(series.labels)}
-        if quantity != "attitude":
+        if quantity in ("position", "velocity"):
             table["horizontal"] = summarise(np.linalg.norm(error[:, :2], axis=1))
             table["3d"] = summarise(np.linalg.norm(error, axis=1))
         tables[quantity] = table
@@ -202,7 +216,10 @@ def evaluate(solution: Solution, reference: Trajectory, lever_b: Floats | None =
             "(UTC taken for GPS)?"
         )
     reference = _select(reference, at.valid)
-    errors = _measure_errors(_select_rows(at), reference, np.zeros(3) if lever_b is None else lever_b)
+    covered = _select_rows(at)
+    errors = _measure_errors(covered, reference, np.zeros(3) if lever_b is None else lever_b)
+    if "attitude" in errors and any(series.kind == "attitude" for series in solution.innovations):
+        errors["inertial_attitude"] = _inertial_attitude(covered, reference)
     outages = solution.outages or find_outages(solution)
     in_outage = mark_unaided(reference.t_ns, solution, outages)
     stretches = {"all": np.ones(len(reference), dtype=np.bool_), "outside": ~in_outage, "inside": in_outage}

@@ -7,7 +7,7 @@ from typing import Literal
 __all__ = [
     "GRADES",
     "AlignmentOptions",
-    "ConsiderOptions",
+    "AttitudeOptions",
     "FilterOptions",
     "GapOptions",
     "GateOptions",
@@ -63,9 +63,11 @@ class AlignmentOptions:
 
     method: ``auto`` takes the first of given angles, attitude series, gyrocompass, course that the log allows; ``reference``
     (never taken by itself) takes roll, pitch and yaw of the reference. given: angles where method is ``given``; given_std
-    their standard deviations. static_window [s]: longest static stretch used for levelling. min_speed [m/s]: GNSS speed from
-    which course counts as heading. course_std [rad]: floor on the standard deviation of a heading from course (side slip,
-    mounting). max_gyrocompass_std [rad]: a worse gyrocompass is not used.
+    their standard deviations, about the body's x, y and z. static_window [s]: longest static stretch used for levelling.
+    min_speed [m/s]: GNSS speed from which course counts as heading. course_std [rad]: floor on the standard deviation of a
+    heading from course (side slip, mounting). max_gyrocompass_std [rad]: a worse gyrocompass is not used.
+    Where nothing in the log tells the place: position is latitude, longitude [rad] and height [m] at the first IMU sample,
+    velocity NED [m/s], with their standard deviations NED [m], [m/s].
     """
 
     method: Literal["auto", "given", "attitude", "reference", "gyrocompass", "course"] = "auto"
@@ -75,6 +77,10 @@ class AlignmentOptions:
     min_speed: float = 2.0
     course_std: float = 3 * _DEG
     max_gyrocompass_std: float = 2 * _DEG
+    position: tuple[float, float, float] | None = None
+    position_std: tuple[float, float, float] = (10.0, 10.0, 10.0)
+    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    velocity_std: tuple[float, float, float] = (0.1, 0.1, 0.1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,6 +136,16 @@ class RangeOptions:
 
 
 @dataclass(frozen=True, slots=True)
+class AttitudeOptions:
+    """Measured attitude. use: let it aid the filter; else it serves alignment alone. default_std [rad]: about each axis where
+    the log does not tell its accuracy. std_floor [rad]: least one believed."""
+
+    use: bool = True
+    default_std: float = 1 * _DEG
+    std_floor: float = 0.1 * _DEG / 3600
+
+
+@dataclass(frozen=True, slots=True)
 class MotionOptions:
     """Motion of a receiver without IMU. model: ``velocity`` is constant but for white acceleration of density horizontal,
     vertical [m/s^2/sqrt(Hz)]; or ``acceleration`` is, but for white jerk of these densities [m/s^3/sqrt(Hz)]."""
@@ -137,25 +153,6 @@ class MotionOptions:
     model: Literal["velocity", "acceleration"] = "velocity"
     horizontal: float = 1.0
     vertical: float = 0.3
-
-
-@dataclass(frozen=True, slots=True)
-class ConsiderOptions:
-    """Unknown constant biases that a filter reckons with but does not estimate: standard deviations, NED where there are three,
-    0 where there is none.
-
-    In the measurements: position_bias [m] and velocity_bias [m/s], as if the antenna were displaced by one and drifted with the
-    other, of fixes as of ranges (along each line of sight); zenith_delay [m] of pseudoranges, divided by the sine of the
-    elevation. In the dynamics: position_rate [m/s] and velocity_rate [m/s^2] add to the derivatives of position and velocity.
-    every_method: reckon with them in every method, not in those alone that are made for it.
-    """
-
-    position_bias: tuple[float, float, float] = (1.0, 1.0, 2.0)
-    velocity_bias: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    zenith_delay: float = 0.0
-    position_rate: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    velocity_rate: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    every_method: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,7 +164,8 @@ class FilterOptions:
     deviations of all GNSS measurements, position_noise_scale and velocity_noise_scale those of fixes besides.
     position_std_floor [m], velocity_std_floor [m/s]: least standard deviations believed.
     default_position_std, default_velocity_std: (horizontal, vertical) by name of FixStatus where the covariance is unknown.
-    use: what aids the filter; ``auto`` takes ranges where the log has them. smooth: carry all measurements backward as well.
+    use: what aids the filter beside attitudes; ``auto`` takes ranges where the log has them, ``attitudes`` neither ranges nor
+    fixes. smooth: carry all measurements backward as well.
     """
 
     imu_noise: ImuNoise = GRADES["consumer"]
@@ -193,8 +191,8 @@ class FilterOptions:
         }
     )
     default_velocity_std: tuple[float, float] = (0.1, 0.2)
-    use: Literal["auto", "fixes", "ranges"] = "auto"
+    use: Literal["auto", "fixes", "ranges", "attitudes"] = "auto"
     smooth: bool = False
     ranges: RangeOptions = RangeOptions()
     motion: MotionOptions = MotionOptions()
-    consider: ConsiderOptions = ConsiderOptions()
+    attitude: AttitudeOptions = AttitudeOptions()

@@ -4,7 +4,7 @@ Euler angles are roll, pitch, yaw: body to navigation is Rz(yaw) Ry(pitch) Rx(ro
 (2006); Markley and Crassidis, Fundamentals of Spacecraft Attitude Determination and Control (2014), chapter 2.
 """
 
-from math import cos, hypot, sin
+from math import atan2, cos, hypot, sin
 from typing import Any
 
 import numpy as np
@@ -81,6 +81,11 @@ def quat_from_rotvec(rotvec: Floats) -> Floats:
 def rotvec_from_quat(q: Floats) -> Floats:
     """Rotation vector (..., 3) [rad] of at most half a turn of unit quaternions (..., 4)."""
     q = np.asarray(q, dtype=np.float64)
+    if q.ndim == 1:
+        w, x, y, z = q.tolist() if q[0] >= 0 else (-q).tolist()
+        length = hypot(x, y, z)
+        scale = 2 * atan2(length, w) / length if length > 0 else 2.0
+        return np.array([scale * x, scale * y, scale * z])
     q = np.where(q[..., :1] < 0, -q, q)
     sine = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
     half = np.arctan2(sine, q[..., :1])

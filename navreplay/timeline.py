@@ -8,11 +8,13 @@ longitude [rad], ellipsoidal height [m]; time as int64 nanoseconds of GPS time s
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "AttitudeFrame",
     "AttitudeSeries",
     "ChannelUse",
     "FixStatus",
@@ -203,25 +205,37 @@ class RangeSeries:
         return np.concatenate([np.flatnonzero(np.diff(self.t_ns, prepend=self.t_ns[0] - 1)), [len(self)]])
 
 
+AttitudeFrame = Literal["navigation", "earth"]
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class AttitudeSeries:
     """Attitude measured by another sensor (dual antenna, AHRS, star tracker).
 
-    t_ns: (n,). q_nb: (n, 4) body to navigation, scalar first. cov: (n, 3, 3) of the small rotation in ``n`` [rad^2], NaN
-    where unknown. heading_only: True when roll and pitch in q_nb carry no information.
+    t_ns: (n,). q: (n, 4) body to frame, scalar first, of unit length. cov: (n, 3, 3) of the small rotation about the axes of
+    frame [rad^2], NaN where unknown. frame: NED at the vehicle, or Earth-fixed. heading_only: True when roll and pitch in q
+    carry no information.
+    Raises LogError unless times strictly increase, quaternions are of unit length and heading_only goes with navigation.
     """
 
     t_ns: Times
-    q_nb: Floats
+    q: Floats
     cov: Floats
+    frame: AttitudeFrame = "navigation"
     heading_only: bool = False
 
     def __post_init__(self) -> None:
         n = len(self.t_ns)
         _check_times("attitude", self.t_ns)
-        _check_shape("attitude", "q_nb", self.q_nb, (n, 4))
+        _check_shape("attitude", "q", self.q, (n, 4))
         _check_shape("attitude", "cov", self.cov, (n, 3, 3))
-        _check_finite("attitude", "q_nb", self.q_nb)
+        _check_finite("attitude", "q", self.q)
+        length = np.linalg.norm(self.q, axis=1)
+        bad = np.flatnonzero(np.abs(length - 1) > 1e-6)
+        if len(bad):
+            raise LogError(f"attitude: the quaternion of row {int(bad[0])} has length {length[bad[0]]:.6g}, not 1")
+        if self.heading_only and self.frame != "navigation":
+            raise LogError("attitude: a heading alone can only be told against north, not against Earth-fixed axes")
 
     def __len__(self) -> int:
         return len(self.t_ns)

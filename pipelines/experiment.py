@@ -227,8 +227,10 @@ def _judge(solution: Solution, log: SyntheticLog, t_ns: Times) -> ArmOutcome:
     evaluation = evaluate(solution, reference)
     at = np.searchsorted(t_ns, evaluation.t_ns)
     errors, nees = np.full((len(t_ns), 9), np.nan), np.full((len(t_ns), 3), np.nan)
+    # where attitudes are measured the position shall not count: against the stars, still resolved in NED
+    judged = evaluation.errors | {"attitude": evaluation.errors.get("inertial_attitude", evaluation.errors["attitude"])}
     for i, quantity in enumerate(QUANTITIES):
-        errors[at, 3 * i : 3 * i + 3] = evaluation.errors[quantity].error
-        nees[at, i] = evaluation.errors[quantity].nees
+        errors[at, 3 * i : 3 * i + 3] = judged[quantity].error
+        nees[at, i] = judged[quantity].nees
     epochs = len(np.unique(np.concatenate([np.empty(0, np.int64), *(series.t_ns for series in solution.innovations)])))
     return ArmOutcome(errors, nees, compare_noise(solution.innovations, log), epochs)

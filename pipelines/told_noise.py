@@ -53,6 +53,8 @@ def tell(log: SyntheticLog, knowledge: Knowledge) -> Timeline:
     if log.fixes is not None and log.fix_errors is not None and log.scenario.gnss is not None:
         interval = 1 / log.scenario.journey.gnss_rate
         timeline = replace(timeline, fixes=_tell_fixes(log.fixes, log.fix_errors, log.scenario.gnss, interval, clairvoyant))
+    if log.attitude is not None and log.attitude_errors is not None:
+        timeline = replace(timeline, attitude=replace(log.attitude, cov=log.attitude_errors.cov))
     if log.ranges is not None and log.range_truth is not None and log.scenario.receiver is not None:
         timeline = replace(timeline, ranges=_tell_ranges(log, log.ranges, log.range_truth, log.scenario.receiver, clairvoyant))
     return timeline
@@ -142,6 +144,12 @@ def _true_variances(log: SyntheticLog) -> dict[str, Mapping[tuple[int, str], flo
             truths[kind] = {
                 (t, axis): float(cov[i, j, j]) for i, t in enumerate(times) for j, axis in enumerate(("north", "east", "down"))
             }
+    if log.attitude is not None and log.attitude_errors is not None:
+        truths["attitude"] = {
+            (t, axis): float(cov[j, j])
+            for t, cov in zip(log.attitude.t_ns.tolist(), log.attitude_errors.cov, strict=True)
+            for j, axis in enumerate(("north", "east", "down"))
+        }
     if log.ranges is not None and log.range_truth is not None:
         keys = list(zip(log.ranges.t_ns.tolist(), log.ranges.sat.tolist(), strict=True))
         errors = log.range_truth.errors

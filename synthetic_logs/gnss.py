@@ -11,17 +11,16 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from navreplay.earth import move_lla, transport_rate_n
-from navreplay.rotation import matrix_from_euler
+from navreplay.rotation import matrix_from_quat
 from navreplay.timeline import FixStatus, Floats, GnssFixSeries, Times
-from synthetic_logs.imu import turn_rate_b
 from synthetic_logs.imu_errors import draw_gauss_markov
-from synthetic_logs.motion import Kinematics
+from synthetic_logs.kinematics import Kinematics
 from synthetic_logs.seeding import generator_for
+from synthetic_logs.windows import ScaledWindow, scale_in
 
 __all__ = ["AntennaPath", "FixErrors", "GnssErrors", "antenna_path", "measure_fixes"]
 
 Triple = tuple[float, float, float]
-ScaledWindow = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,17 +83,10 @@ class FixErrors:
 
 def antenna_path(motion: Kinematics, lever_b: Floats) -> AntennaPath:
     """Position and velocity of a point at lever_b (3,) [m] in the body axes of motion, relative to the Earth."""
-    c_nb = matrix_from_euler(*motion.euler.T)
+    c_nb = matrix_from_quat(motion.q_nb)
     offset_n = np.einsum("kij,j->ki", c_nb, lever_b)
-    turn_n = np.einsum("kij,kj->ki", c_nb, turn_rate_b(motion)) + transport_rate_n(motion.lla, motion.vel_n)
+    turn_n = np.einsum("kij,kj->ki", c_nb, motion.turn_b) + transport_rate_n(motion.lla, motion.vel_n)
     return AntennaPath(move_lla(motion.lla, offset_n), motion.vel_n + np.cross(turn_n, offset_n))
-
-
-def _scale_in(windows: tuple[ScaledWindow, ...], t_s: Floats) -> Floats:
-    scale = np.ones(len(t_s))
-    for start, end, factor in windows:
-        scale[(t_s >= start) & (t_s < end)] *= factor
-    return scale
 
 
 def _diagonal(std: Floats) -> Floats:
@@ -116,7 +108,7 @@ def _draw_errors(antenna: AntennaPath, t_s: Floats, interval: float, errors: Gns
     outlier = generator_for(seed, "outlier epochs").random(n) < errors.outlier_probability
     direction = generator_for(seed, "outlier directions").standard_normal((n, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    window_scale = _scale_in(errors.noise_windows, t_s)[:, None]
+    window_scale = scale_in(errors.noise_windows, t_s)[:, None]
     drawn_scale = window_scale * np.where(wide, errors.mixture_scale, 1.0)[:, None]
     share = errors.mixture_probability
     moment_scale = window_scale * np.sqrt(1 - share + share * errors.mixture_scale**2)
@@ -138,7 +130,7 @@ def measure_fixes(
     """
     drawn = _draw_errors(antenna, t_s, interval, errors, seed)
     n = len(t_s)
-    told_scale = _scale_in(errors.told_windows, t_s)[:, None]
+    told_scale = scale_in(errors.told_windows, t_s)[:, None]
     told_position = np.array(errors.told_position_std or np.hypot(errors.position_std, errors.correlated_std))
     cov_pos = _diagonal(told_scale * told_position)
     vel_n, cov_vel = np.full((n, 3), np.nan), np.full((n, 3, 3), np.nan)

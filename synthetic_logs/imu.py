@@ -7,24 +7,14 @@ section 5.4 solved for the sensors).
 
 import numpy as np
 
-from navreplay.earth import earth_rate_n, gravity, transport_rate_n
-from navreplay.rotation import matrix_from_euler
+from navreplay.earth import earth_rate_n, gravity_n, transport_rate_n
+from navreplay.rotation import matrix_from_quat
 from navreplay.timeline import Floats
-from synthetic_logs.motion import Kinematics, Path
+from synthetic_logs.kinematics import Path
 
-__all__ = ["sense", "sense_means", "turn_rate_b"]
+__all__ = ["sense", "sense_means"]
 
 _NODES, _WEIGHTS = (np.polynomial.legendre.leggauss(3)[0] + 1) / 2, np.polynomial.legendre.leggauss(3)[1] / 2
-
-
-def turn_rate_b(motion: Kinematics) -> Floats:
-    """Angular rate of the body against NED, body axes (n, 3) [rad/s], from Euler angles and their rates."""
-    roll, pitch, _ = motion.euler.T
-    roll_rate, pitch_rate, yaw_rate = motion.euler_rate.T
-    x = roll_rate - yaw_rate * np.sin(pitch)
-    y = pitch_rate * np.cos(roll) + yaw_rate * np.cos(pitch) * np.sin(roll)
-    z = -pitch_rate * np.sin(roll) + yaw_rate * np.cos(pitch) * np.cos(roll)
-    return np.stack([x, y, z], axis=-1)
 
 
 def sense(path: Path, t_s: Floats) -> tuple[Floats, Floats]:
@@ -32,10 +22,10 @@ def sense(path: Path, t_s: Floats) -> tuple[Floats, Floats]:
     motion = path.at(t_s)
     earth_n = earth_rate_n(motion.lla[:, 0])
     transport_n = transport_rate_n(motion.lla, motion.vel_n)
-    force_n = motion.accel_n + np.cross(2 * earth_n + transport_n, motion.vel_n)
-    force_n[:, 2] -= gravity(motion.lla[:, 0], motion.lla[:, 2])
-    c_nb = matrix_from_euler(*motion.euler.T)
-    gyro = turn_rate_b(motion) + np.einsum("kji,kj->ki", c_nb, earth_n + transport_n)
+    coriolis_n = np.cross(2 * earth_n + transport_n, motion.vel_n)
+    force_n = motion.accel_n + coriolis_n - gravity_n(motion.lla[:, 0], motion.lla[:, 2])
+    c_nb = matrix_from_quat(motion.q_nb)
+    gyro = motion.turn_b + np.einsum("kji,kj->ki", c_nb, earth_n + transport_n)
     return gyro, np.einsum("kji,kj->ki", c_nb, force_n)
 
 

@@ -13,6 +13,7 @@ from numpy.random import Generator
 from navreplay.options import ImuNoise
 from navreplay.timeline import Floats, ImuSeries
 from synthetic_logs.seeding import generator_for
+from synthetic_logs.windows import ScaledWindow, scale_in
 
 __all__ = ["ImuErrors", "SensorErrors", "disturb_imu", "draw_gauss_markov"]
 
@@ -23,6 +24,7 @@ class ImuErrors:
 
     noise: densities, turn-on and in-run biases, scale factors. gyro_misalignment_std, accel_misalignment_std [rad]: of each of
     the six cross-axis terms. gyro_quantum [rad/s], accel_quantum [m/s^2]: resolution of the samples (0: none).
+    noise_windows: (start, end, scale) of the standard deviation of the white noise of both, which `noise` does not tell.
     """
 
     noise: ImuNoise
@@ -30,6 +32,7 @@ class ImuErrors:
     accel_misalignment_std: float = 0.0
     gyro_quantum: float = 0.0
     accel_quantum: float = 0.0
+    noise_windows: tuple[ScaledWindow, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,14 +82,15 @@ def _draw_markov(model: _Triad, dt: float, n: int, seed: int) -> Floats:
     return draw_gauss_markov(rng, model.markov_std * rng.standard_normal(3), walk, model.markov_tau, dt, n)
 
 
-def _disturb(true: Floats, dt: float, model: _Triad, seed: int) -> tuple[Floats, SensorErrors]:
+def _disturb(true: Floats, dt: float, model: _Triad, noise_scale: Floats, seed: int) -> tuple[Floats, SensorErrors]:
     turn_on = model.bias_std * generator_for(seed, f"{model.name} turn-on bias").standard_normal(3)
     bias = draw_gauss_markov(generator_for(seed, f"{model.name} bias walk"), turn_on, model.walk, model.tau, dt, len(true))
     if model.markov_std > 0:
         bias = bias + _draw_markov(model, dt, len(true), seed)
     matrix = model.misalignment_std * generator_for(seed, f"{model.name} misalignment").standard_normal((3, 3))
     np.fill_diagonal(matrix, model.scale_std * generator_for(seed, f"{model.name} scale").standard_normal(3))
-    noise = model.density / sqrt(dt) * generator_for(seed, f"{model.name} noise").standard_normal(true.shape)
+    white = model.density / sqrt(dt) * generator_for(seed, f"{model.name} noise").standard_normal(true.shape)
+    noise = noise_scale[:, None] * white
     measured = true + true @ matrix.T + bias + noise
     if model.quantum > 0:
         measured = model.quantum * np.rint(measured / model.quantum)
@@ -121,6 +125,7 @@ def disturb_imu(true: ImuSeries, dt: float, errors: ImuErrors, seed: int) -> tup
         errors.accel_misalignment_std,
         errors.accel_quantum,
     )
-    gyro, gyro_errors = _disturb(true.gyro, dt, gyro_model, seed)
-    accel, accel_errors = _disturb(true.accel, dt, accel_model, seed)
+    noise_scale = scale_in(errors.noise_windows, (true.t_ns - true.t_ns[0]) / 1e9)
+    gyro, gyro_errors = _disturb(true.gyro, dt, gyro_model, noise_scale, seed)
+    accel, accel_errors = _disturb(true.accel, dt, accel_model, noise_scale, seed)
     return ImuSeries(true.t_ns, gyro, accel, true.increments), gyro_errors, accel_errors

@@ -16,20 +16,21 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline, PPoly
 
 from navreplay.earth import radii
+from navreplay.rotation import quat_from_euler
 from navreplay.timeline import Floats
+from synthetic_logs.kinematics import Kinematics
 
 __all__ = [
-    "Kinematics",
+    "LegPath",
     "Motion",
-    "Path",
     "Segment",
     "accelerate",
     "climb",
     "course_rate_of_bank",
+    "smooth_step",
     "spiral",
     "stop",
     "straight",
-    "trace",
     "turn",
 ]
 
@@ -125,22 +126,18 @@ class Motion:
         """The segments in order, without end."""
         return chain(self.legs, cycle(self.loop or straight(60.0)))
 
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Kinematics:
-    """Motion at (n,) times: lla (n, 3) [rad, rad, m], vel_n (n, 3) and its derivative by time accel_n (n, 3) NED [m/s, m/s^2],
-    euler (n, 3) roll, pitch, yaw [rad] and euler_rate (n, 3) [rad/s]."""
-
-    lla: Floats
-    vel_n: Floats
-    accel_n: Floats
-    euler: Floats
-    euler_rate: Floats
+    def trace(self, duration: float) -> "LegPath":
+        """The motion integrated over duration [s]."""
+        panels = int(np.ceil(duration / _PANEL_S)) + 1
+        grid = np.arange(panels + 1, dtype=np.float64) * _PANEL_S
+        profile, course = _profiles(self, float(grid[-1]))
+        lla = _integrate_position(np.array(self.lla), profile, course, grid)
+        return LegPath(duration, self.coordinated, profile, course, lla)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Path:
-    """A motion made ready for evaluation at any time within duration [s]; see `trace`."""
+class LegPath:
+    """A motion made ready for evaluation at any time within duration [s]; see `Motion.trace`."""
 
     duration: float
     coordinated: bool
@@ -164,22 +161,23 @@ class Path:
             slope = across * yaw_rate / _STANDARD_GRAVITY
             roll = np.arctan(slope)
             roll_rate = (across_rate * yaw_rate + across * yaw_accel) / _STANDARD_GRAVITY / (1 + slope**2)
-        return Kinematics(
-            self.lla(t_s),
-            vel_n,
-            accel_n,
-            np.stack([roll, pitch, yaw], axis=-1),
-            np.stack([roll_rate, pitch_rate, yaw_rate], axis=-1),
-        )
+        turn_b = _turn_rate_b(roll, pitch, roll_rate, pitch_rate, yaw_rate)
+        return Kinematics(self.lla(t_s), vel_n, accel_n, quat_from_euler(roll, pitch, yaw), turn_b)
 
 
-def trace(motion: Motion, duration: float) -> Path:
-    """Integrates a motion over duration [s]."""
-    panels = int(np.ceil(duration / _PANEL_S)) + 1
-    grid = np.arange(panels + 1, dtype=np.float64) * _PANEL_S
-    profile, course = _profiles(motion, float(grid[-1]))
-    lla = _integrate_position(np.array(motion.lla), profile, course, grid)
-    return Path(duration, motion.coordinated, profile, course, lla)
+def _turn_rate_b(roll: Floats, pitch: Floats, roll_rate: Floats, pitch_rate: Floats, yaw_rate: Floats) -> Floats:
+    """Angular rate of the body against NED, body axes (n, 3) [rad/s], from Euler angles and their rates (n,)."""
+    x = roll_rate - yaw_rate * np.sin(pitch)
+    y = pitch_rate * np.cos(roll) + yaw_rate * np.cos(pitch) * np.sin(roll)
+    z = -pitch_rate * np.sin(roll) + yaw_rate * np.cos(pitch) * np.cos(roll)
+    return np.stack([x, y, z], axis=-1)
+
+
+def smooth_step(u: Floats) -> tuple[Floats, Floats]:
+    """The smooth step from 0 to 1 on [0, 1], constant beyond, and its derivative, at u (n,)."""
+    u = np.clip(u, 0.0, 1.0)
+    c7, c6, c5, c4 = _SMOOTH_STEP
+    return u**4 * (c4 + u * (c5 + u * (c6 + u * c7))), u**3 * (4 * c4 + u * (5 * c5 + u * (6 * c6 + u * 7 * c7)))
 
 
 def _profiles(motion: Motion, duration: float) -> tuple[PPoly, PPoly]:

@@ -1,15 +1,17 @@
 """Scenarios by name. A scenario is a plain value: `dataclasses.replace` makes another of it, `with_duration` a shorter one."""
 
 from dataclasses import replace
-from math import pi
+from math import pi, sqrt
 
 from navreplay.options import ImuNoise
 from navreplay.timeline import FixStatus
+from synthetic_logs.ballistic import BallisticFlight
 from synthetic_logs.gnss import GnssErrors
 from synthetic_logs.imu_errors import ImuErrors
 from synthetic_logs.motion import Leg, Motion, accelerate, climb, course_rate_of_bank, spiral, stop, straight, turn
 from synthetic_logs.range_scenarios import RANGE_SCENARIOS
 from synthetic_logs.simulation import Journey, Scenario
+from synthetic_logs.star_sensor import StarSensor
 
 __all__ = ["SCENARIOS"]
 
@@ -129,6 +131,18 @@ _UAV_JOURNEY = Journey(_UAV, 600.0, increments=True, lever_b=_UAV_LEVER)
 _AIRBORNE_JOURNEY = Journey(_UAV_AIRBORNE, 1000.0, imu_rate=25.0, increments=True)
 _OUTAGES = tuple((90.0 + 60.0 * i, 105.0 + 60.0 * i) for i in range(8))
 
+# Si, Wang and Niu, table 1: white noise is told per sample of a 100 Hz IMU; drift and bias are drawn with these deviations
+_BALLISTIC_G0 = 9.7803267714
+_BALLISTIC_NOISE = ImuNoise(0.1 * _DPH, 5e-5 * _BALLISTIC_G0, 0.5 * _DPH, 1e-4 * _BALLISTIC_G0, 0.0, 0.0)
+_BALLISTIC = Scenario(
+    "ballistic",
+    "Ballistic flight of 600 s: IMU of 1 deg/h and 0.5 mg white noise per sample at 100 Hz, star sensor of 1 arcsec at 20 Hz.",
+    Journey(BallisticFlight(_place(39.98, 116.34, 0.0), 90 * _DEG), 600.0, increments=True),
+    ImuErrors(_BALLISTIC_NOISE),
+    None,
+    stars=StarSensor(),
+)
+
 _ALL = (
     Scenario(
         "static",
@@ -213,6 +227,13 @@ _ALL = (
         Journey(_SPIRAL, 595.0, increments=True, lever_b=_UAV_LEVER),
         _NAVIGATION,
         GnssErrors((5.0, 5.0, 8.0), None),
+    ),
+    _BALLISTIC,
+    replace(
+        _BALLISTIC,
+        name="ballistic-step",
+        description="The same; from 200 to 400 s the white noise of the IMU has ten times its variance.",
+        imu=replace(_BALLISTIC.imu, noise_windows=((200.0, 400.0, sqrt(10)),)),
     ),
 )
 

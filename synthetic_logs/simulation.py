@@ -6,16 +6,27 @@ from functools import lru_cache
 import numpy as np
 
 from navreplay.atmosphere import SPEED_OF_LIGHT
-from navreplay.rotation import quat_from_euler
-from navreplay.timeline import Floats, GnssFixSeries, ImuSeries, LogError, RangeSeries, Timeline, Times, Trajectory
+from navreplay.rotation import euler_from_quat
+from navreplay.timeline import (
+    AttitudeSeries,
+    Floats,
+    GnssFixSeries,
+    ImuSeries,
+    LogError,
+    RangeSeries,
+    Timeline,
+    Times,
+    Trajectory,
+)
 from synthetic_logs.constellation import Orbits, arrange_constellation
 from synthetic_logs.gnss import AntennaPath, FixErrors, GnssErrors, antenna_path, measure_fixes
 from synthetic_logs.imu import sense, sense_means
 from synthetic_logs.imu_errors import ImuErrors, SensorErrors, disturb_imu
-from synthetic_logs.motion import Motion, Path, trace
+from synthetic_logs.kinematics import Path, Traceable
 from synthetic_logs.ranges import Epochs, RangeTruth, measure_ranges
 from synthetic_logs.receiver import Receiver
 from synthetic_logs.receiver_clock import draw_clock
+from synthetic_logs.star_sensor import AttitudeErrors, StarSensor, measure_attitudes
 
 __all__ = ["Journey", "Scenario", "SyntheticLog", "ideal_imu", "orbits_of", "simulate", "truth_at", "with_duration"]
 
@@ -31,7 +42,7 @@ class Journey:
     from the IMU to the antenna [m]. truth_rate [Hz]: of the truth, brought to a whole number of IMU intervals.
     """
 
-    motion: Motion
+    motion: Traceable
     duration: float
     imu_rate: float = 100.0
     increments: bool = False
@@ -45,7 +56,7 @@ class Journey:
 @dataclass(frozen=True, slots=True)
 class Scenario:
     """A journey with the errors of its sensors; description is one line. gnss: fixes, None where the log has none. receiver: of
-    ranges, None where the log has none."""
+    ranges, stars: of attitudes, None where the log has none."""
 
     name: str
     description: str
@@ -53,12 +64,14 @@ class Scenario:
     imu: ImuErrors
     gnss: GnssErrors | None
     receiver: Receiver | None = None
+    stars: StarSensor | None = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SyntheticLog:
     """A log and everything that went into it. truth: of the IMU, at every so many IMU stamps (Journey.truth_rate), its
-    covariance unknown. gyro_errors, accel_errors: at the IMU stamps. fix_errors, range_truth: row by row of fixes, ranges."""
+    covariance unknown. gyro_errors, accel_errors: at the IMU stamps. fix_errors, range_truth, attitude_errors: row by row of
+    fixes, ranges, attitudes."""
 
     scenario: Scenario
     seed: int
@@ -70,11 +83,20 @@ class SyntheticLog:
     accel_errors: SensorErrors
     fix_errors: FixErrors | None
     range_truth: RangeTruth | None
+    attitude: AttitudeSeries | None = None
+    attitude_errors: AttitudeErrors | None = None
 
     def timeline(self) -> Timeline:
         """The log as a filter sees it, with the truth as reference."""
         lever_b = np.array(self.scenario.journey.lever_b)
-        return Timeline(imu=self.imu, fixes=self.fixes, ranges=self.ranges, reference=self.truth, fix_lever_b=lever_b)
+        return Timeline(
+            imu=self.imu,
+            fixes=self.fixes,
+            ranges=self.ranges,
+            attitude=self.attitude,
+            reference=self.truth,
+            fix_lever_b=lever_b,
+        )
 
 
 def with_duration(scenario: Scenario, duration: float) -> Scenario:
@@ -102,7 +124,25 @@ def simulate(scenario: Scenario, seed: int) -> SyntheticLog:
     if scenario.receiver is not None:
         epochs = _receiver_epochs(journey, scenario.receiver, seed)
         ranges, range_truth = measure_ranges(scenario.receiver, orbits_of(journey, scenario.receiver), epochs, seed)
-    return SyntheticLog(scenario, seed, imu, fixes, ranges, _truth(journey), gyro_errors, accel_errors, fix_errors, range_truth)
+    attitude, attitude_errors = None, None
+    if scenario.stars is not None:
+        t_ns = _stamps(journey, scenario.stars.rate, scenario.stars.offset)
+        motion = _journey_path(journey).at(_path_time(journey, t_ns))
+        attitude, attitude_errors = measure_attitudes(t_ns, (t_ns - journey.start_ns) / 1e9, motion, scenario.stars, seed)
+    return SyntheticLog(
+        scenario,
+        seed,
+        imu,
+        fixes,
+        ranges,
+        _truth(journey),
+        gyro_errors,
+        accel_errors,
+        fix_errors,
+        range_truth,
+        attitude,
+        attitude_errors,
+    )
 
 
 def orbits_of(journey: Journey, receiver: Receiver) -> Orbits:
@@ -115,8 +155,9 @@ def _receiver_epochs(journey: Journey, receiver: Receiver, seed: int) -> Epochs:
     clock = draw_clock(receiver.clock, len(t_ns), 1 / journey.gnss_rate, seed)
     motion = _journey_path(journey).at(_path_time(journey, t_ns) - clock.offset / SPEED_OF_LIGHT)
     antenna = antenna_path(motion, np.array(journey.lever_b))
+    course = euler_from_quat(motion.q_nb)[:, 2]
     t_s = (t_ns - journey.start_ns) / 1e9
-    return Epochs(1 / journey.gnss_rate, t_ns, t_s, clock, antenna, motion.euler[:, 2])
+    return Epochs(1 / journey.gnss_rate, t_ns, t_s, clock, antenna, course)
 
 
 def _stamps(journey: Journey, rate: float, offset: float) -> Times:
@@ -135,8 +176,8 @@ def _read_only(*arrays: np.ndarray) -> None:
 
 
 @lru_cache(maxsize=4)
-def _path(motion: Motion, duration: float) -> Path:
-    return trace(motion, duration)
+def _path(motion: Traceable, duration: float) -> Path:
+    return motion.trace(duration)
 
 
 def _journey_path(journey: Journey) -> Path:
@@ -178,4 +219,4 @@ def truth_at(journey: Journey, t_ns: Times) -> Trajectory:
     """The exact motion of the IMU at times t_ns (n,) [GPS ns] within the journey."""
     motion = _journey_path(journey).at(_path_time(journey, t_ns))
     unknown = np.full((len(t_ns), 3, 3), np.nan)
-    return Trajectory(t_ns, motion.lla, motion.vel_n, quat_from_euler(*motion.euler.T), unknown)
+    return Trajectory(t_ns, motion.lla, motion.vel_n, motion.q_nb, unknown)

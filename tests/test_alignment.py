@@ -130,7 +130,7 @@ def test_gyrocompass_with_good_gyros():
     c_bn = rotation.matrix_from_euler(0.02, -0.05, yaw).T
     rng = np.random.default_rng(4)
     gyro = c_bn @ earth.earth_rate_n(lla[0]) + rng.normal(0, 1e-6, (n, 3))
-    accel = np.tile(c_bn @ [0, 0, -float(earth.gravity(lla[0], lla[2]))], (n, 1))
+    accel = np.tile(c_bn @ -earth.gravity_n(lla[0], lla[2]), (n, 1))
     t = 10**18 + 10_000_000 * np.arange(n)
     k = 500
     unknown = np.full((k, 3, 3), np.nan)

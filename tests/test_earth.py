@@ -9,8 +9,32 @@ from navreplay import earth
 
 
 def test_gravity_at_the_equator_and_the_pole():
-    assert earth.gravity(0.0, 0.0) == pytest.approx(9.7803253359, abs=1e-10)
-    assert earth.gravity(np.pi / 2, 0.0) == pytest.approx(9.8321849379, abs=1e-9)
+    assert earth.gravity(0.0, 0.0) == pytest.approx(9.7803253359, abs=2e-9)
+    assert earth.gravity(np.pi / 2, 0.0) == pytest.approx(9.8321849379, abs=2e-9)
+
+
+def test_normal_gravity_on_the_ellipsoid_is_that_of_somigliana_and_points_straight_down():
+    lat = np.linspace(-1.5, 1.5, 61)
+    gravity_n = earth.gravity_n(lat, np.zeros_like(lat))
+    sine2 = np.sin(lat) ** 2
+    somigliana = 9.7803253359 * (1 + 1.931852652458e-3 * sine2) / np.sqrt(1 - earth.ECCENTRICITY_SQUARED * sine2)
+    np.testing.assert_allclose(gravity_n[:, 2], somigliana, atol=2e-9)
+    np.testing.assert_allclose(gravity_n[:, :2], 0, atol=2e-9)
+
+
+@pytest.mark.parametrize("height", [0.0, 3e5, 2e7])
+def test_gravitation_is_the_gradient_of_the_zonal_potential(height):
+    def potential(r):
+        distance = np.linalg.norm(r)
+        zonal = [0, 0, 1.08262982131e-3, 0, -2.37091120053e-6, 0, 6.08346498882e-9]
+        ratio = earth.SEMI_MAJOR_AXIS / distance
+        weighted = [coefficient * ratio**degree for degree, coefficient in enumerate(zonal)]
+        return earth.GM / distance * (1 - np.polynomial.legendre.legval(r[2] / distance, weighted))
+
+    r = earth.ecef_from_lla(np.array([0.6, 2.0, height]))
+    steps = 100.0 * np.eye(3)
+    gradient = [(potential(r + step) - potential(r - step)) / 200.0 for step in steps]
+    np.testing.assert_allclose(earth.gravitation(r), gradient, atol=2e-8)
 
 
 def test_gravity_falls_with_height_as_the_free_air_gradient():

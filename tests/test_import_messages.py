@@ -248,7 +248,7 @@ def test_attitude_is_used_only_where_named_and_turned_to_ned(tmp_path):
     tables = {"/q": ("geometry_msgs/msg/QuaternionStamped", table), "/imu": (IMU, imu_table())}
     assert load_tables(tmp_path, tables).attitude is None
     timeline = load_tables(tmp_path, tables, {"attitude": {"channel": "/q"}})
-    np.testing.assert_allclose(np.degrees(euler_from_quat(timeline.attitude.q_nb[0])), [0, 0, 90], atol=1e-9)
+    np.testing.assert_allclose(np.degrees(euler_from_quat(timeline.attitude.q[0])), [0, 0, 90], atol=1e-9)
     assert dict(uses(timeline)["/q"].rejected) == {"not finite or not a quaternion": 1}
 
 

@@ -42,7 +42,7 @@ def test_at_rest_stays_at_rest():
     c_bn = rotation.matrix_from_quat(q).T
     n = 6001
     gyro = np.tile(c_bn @ earth.earth_rate_n(lla[0]), (n, 1))
-    accel = np.tile(c_bn @ [0, 0, -float(earth.gravity(lla[0], lla[2]))], (n, 1))
+    accel = np.tile(c_bn @ -earth.gravity_n(lla[0], lla[2]), (n, 1))
     path = mechanise(ImuSeries(times(n), gyro, accel), NavState.at(lla, np.zeros(3), q))
     assert np.abs(earth.ned_between(lla, path.lla[-1])).max() < 1e-6
     np.testing.assert_allclose(path.vel_n[-1], 0, atol=1e-8)

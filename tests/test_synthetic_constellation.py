@@ -12,7 +12,6 @@ from navreplay.earth import EARTH_RATE, ecef_from_lla
 from synthetic_logs import SCENARIOS, Receiver
 from synthetic_logs.constellation import arrange_constellation, ascending_node, refer_to, satellite_states
 from synthetic_logs.gnss import antenna_path
-from synthetic_logs.motion import trace
 from synthetic_logs.sight import sight_satellites
 from synthetic_logs.signals import carrier_of, signal_of, system_of
 from synthetic_logs.simulation import orbits_of
@@ -21,7 +20,7 @@ HOUR_NS = 3_600_000_000_000
 REFERENCE_NS = 387_000 * HOUR_NS
 ORBITS = arrange_constellation("GEC", REFERENCE_NS)
 LEVER = np.array([-0.4, 0.2, -1.3])
-DRIVE = trace(SCENARIOS["ranges-open"].journey.motion, 120.0)
+DRIVE = SCENARIOS["ranges-open"].journey.motion.trace(120.0)
 
 
 def sight_at(t_s):

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from navreplay.earth import EARTH_RATE, gravity, ned_between, radii
+from navreplay.earth import EARTH_RATE, gravity, gravity_n, ned_between, radii
+from navreplay.rotation import euler_from_quat, quat_conjugate, quat_multiply, rotvec_from_quat
 from navreplay.strapdown import NavState, mechanise
 from synthetic_logs import SCENARIOS, ideal_imu, truth_at
 from synthetic_logs.imu import sense, sense_means
-from synthetic_logs.motion import Motion, accelerate, climb, course_rate_of_bank, spiral, stop, straight, trace, turn
+from synthetic_logs.motion import Motion, accelerate, climb, course_rate_of_bank, spiral, stop, straight, turn
 
 DEG = pi / 180
 PLACE = (45 * DEG, 7 * DEG, 200.0)
@@ -31,18 +32,19 @@ def central_difference(function, t_s, step=1e-4):
 
 @pytest.mark.parametrize("coordinated", [False, True])
 def test_rates_are_the_derivatives(coordinated):
-    path = trace(Motion(PLACE, LEGS, coordinated=coordinated), 100.0)
+    path = Motion(PLACE, LEGS, coordinated=coordinated).trace(100.0)
     t_s = np.linspace(0.5, 99.5, 1501)
     motion = path.at(t_s)
     np.testing.assert_allclose(central_difference(lambda t: path.at(t).vel_n, t_s), motion.accel_n, atol=1e-6)
-    np.testing.assert_allclose(central_difference(lambda t: path.at(t).euler, t_s), motion.euler_rate, atol=1e-6)
+    before, after = path.at(t_s - 1e-4).q_nb, path.at(t_s + 1e-4).q_nb
+    np.testing.assert_allclose(rotvec_from_quat(quat_multiply(quat_conjugate(before), after)) / 2e-4, motion.turn_b, atol=1e-6)
     moved = ned_between(path.at(t_s - 0.01).lla, path.at(t_s + 0.01).lla) / 0.02
     np.testing.assert_allclose(moved, motion.vel_n, atol=3e-4)
     assert np.ptp(motion.accel_n, axis=0).min() > 1
 
 
 def test_profiles_are_smooth_to_the_third_derivative_at_every_knot():
-    path = trace(Motion(PLACE, LEGS), 90.0)
+    path = Motion(PLACE, LEGS).trace(90.0)
     knots = path.profile.x[1:-1]
     for order in range(4):
         derivative = path.profile.derivative(order) if order else path.profile
@@ -51,12 +53,13 @@ def test_profiles_are_smooth_to_the_third_derivative_at_every_knot():
 
 
 def test_legs_reach_what_they_name():
-    path = trace(Motion(PLACE, LEGS, course=10 * DEG), 120.0)
+    path = Motion(PLACE, LEGS, course=10 * DEG).trace(120.0)
     ends = np.cumsum([5.0, 10.0, 90 / 12 + 2, 20.0, 200 / 9 + 4, 8.0, 10.0])
     at_ends = path.at(ends)
+    euler = euler_from_quat(at_ends.q_nb)
     np.testing.assert_allclose(np.linalg.norm(at_ends.vel_n, axis=1), [0, 20, 20, 20, 20, 0, 0], atol=1e-12)
-    np.testing.assert_allclose(at_ends.euler[:, 2] / DEG, [10, 10, 100, 100, -100, -100, -100], atol=1e-9)
-    np.testing.assert_allclose(at_ends.euler[:, 1], 0, atol=1e-12)
+    np.testing.assert_allclose(euler[:, 2] / DEG, [10, 10, 100, 100, -100, -100, -100], atol=1e-9)
+    np.testing.assert_allclose(euler[:, 1], 0, atol=1e-12)
     assert at_ends.lla[3, 2] > 220
     assert at_ends.lla[4, 2] < at_ends.lla[3, 2] - 20
     np.testing.assert_array_equal(at_ends.lla[5], at_ends.lla[6])
@@ -64,9 +67,9 @@ def test_legs_reach_what_they_name():
 
 def test_loop_repeats_and_without_one_the_motion_goes_on_straight():
     loop = accelerate(10.0, 5.0) + stop(5.0, 5.0)
-    speeds = np.linalg.norm(trace(Motion(PLACE, straight(1.0), loop), 100.0).at(6.0 + 15.0 * np.arange(6)).vel_n, axis=1)
+    speeds = np.linalg.norm(Motion(PLACE, straight(1.0), loop).trace(100.0).at(6.0 + 15.0 * np.arange(6)).vel_n, axis=1)
     np.testing.assert_allclose(speeds, 10.0)
-    onward = trace(Motion(PLACE, accelerate(10.0, 5.0)), 300.0).at(np.array([5.0, 100.0, 300.0]))
+    onward = Motion(PLACE, accelerate(10.0, 5.0)).trace(300.0).at(np.array([5.0, 100.0, 300.0]))
     np.testing.assert_allclose(onward.vel_n[:, 0], 10.0)
 
 
@@ -77,27 +80,28 @@ def test_impossible_legs_are_refused(make):
 
 
 def test_position_along_meridian_and_parallel_matches_closed_forms():
-    north = trace(Motion(PLACE, straight(60.0), speed=100.0), 600.0).at(np.array([600.0])).lla[0]
+    north = Motion(PLACE, straight(60.0), speed=100.0).trace(600.0).at(np.array([600.0])).lla[0]
     arc, _ = quad(lambda lat: float(radii(lat)[0]) + PLACE[2], PLACE[0], north[0], epsabs=1e-6, epsrel=1e-13)
     assert arc == pytest.approx(60000.0, abs=1e-6)
-    east = trace(Motion(PLACE, straight(60.0), speed=100.0, course=pi / 2), 600.0).at(np.array([600.0])).lla[0]
+    east = Motion(PLACE, straight(60.0), speed=100.0, course=pi / 2).trace(600.0).at(np.array([600.0])).lla[0]
     _, normal = radii(PLACE[0])
     assert (east[1] - PLACE[1]) * (normal + PLACE[2]) * np.cos(PLACE[0]) == pytest.approx(60000.0, abs=1e-6)
     assert (east[0] - PLACE[0]) * 6.4e6 == pytest.approx(0, abs=1e-6)
 
 
 def test_standing_imu_senses_gravity_and_earth_rate():
-    path = trace(Motion(PLACE, straight(10.0), course=pi / 2), 10.0)
+    path = Motion(PLACE, straight(10.0), course=pi / 2).trace(10.0)
     t_s = np.linspace(0.0, 10.0, 11)
+    facing_east = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     expected_gyro = [0.0, -EARTH_RATE * np.cos(PLACE[0]), -EARTH_RATE * np.sin(PLACE[0])]
     for gyro, accel in (sense(path, t_s), sense_means(path, t_s[:-1], t_s[1:])):
         np.testing.assert_allclose(gyro, np.tile(expected_gyro, (len(gyro), 1)), atol=1e-16)
-        np.testing.assert_allclose(accel, np.tile([0, 0, -gravity(PLACE[0], PLACE[2])], (len(accel), 1)), atol=1e-12)
+        np.testing.assert_allclose(accel, np.tile(facing_east @ -gravity_n(PLACE[0], PLACE[2]), (len(accel), 1)), atol=1e-12)
 
 
 def test_eastward_speed_lightens_by_eotvos():
     speed = 100.0
-    path = trace(Motion(PLACE, straight(10.0), speed=speed, course=pi / 2), 10.0)
+    path = Motion(PLACE, straight(10.0), speed=speed, course=pi / 2).trace(10.0)
     _, accel = sense(path, np.array([5.0]))
     _, normal = radii(PLACE[0])
     eotvos = 2 * EARTH_RATE * speed * np.cos(PLACE[0]) + speed**2 / (normal + PLACE[2])
@@ -108,17 +112,17 @@ def test_level_circle_has_centripetal_force_on_a_car_and_none_on_a_banked_aircra
     rate, speed = course_rate_of_bank(20 * DEG, 30.0), 30.0
     legs = turn(3 * pi, rate)
     at = np.array([20.0])
-    gyro, accel = sense(trace(Motion(PLACE, legs, speed=speed), 40.0), at)
+    gyro, accel = sense(Motion(PLACE, legs, speed=speed).trace(40.0), at)
     earth_and_coriolis = 2 * EARTH_RATE * speed
     assert accel[0, 1] == pytest.approx(speed * rate, abs=earth_and_coriolis)
     assert gyro[0, 2] == pytest.approx(rate, abs=2 * EARTH_RATE)
-    gyro, accel = sense(trace(Motion(PLACE, legs, speed=speed, coordinated=True), 40.0), at)
+    gyro, accel = sense(Motion(PLACE, legs, speed=speed, coordinated=True).trace(40.0), at)
     assert accel[0, 1] == pytest.approx(0, abs=0.01)
     np.testing.assert_allclose(gyro[0], [0, rate * np.sin(20 * DEG), rate * np.cos(20 * DEG)], atol=2 * EARTH_RATE)
 
 
 def test_means_equal_the_integral_of_the_rates():
-    path = trace(Motion(PLACE, LEGS, coordinated=True), 60.0)
+    path = Motion(PLACE, LEGS, coordinated=True).trace(60.0)
     edges = np.linspace(14.0, 24.0, 1001)
     gyro, accel = sense_means(path, edges[:-1], edges[1:])
     fine = np.linspace(14.0, 24.0, 50001)

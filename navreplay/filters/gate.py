@@ -37,11 +37,12 @@ def _rows_of(kinds: tuple[str, ...]) -> dict[str, np.ndarray]:
 
 
 class Gate:
-    """Chi-square gate with a count of position epochs rejected in a row."""
+    """Chi-square gate with a count of the epochs rejected in a row, by what an epoch measures first: a velocity that passes
+    says nothing of positions, nor an attitude."""
 
     def __init__(self, options: GateOptions) -> None:
         self._options = options
-        self._run = 0
+        self._runs: dict[str, int] = {}
 
     def judge(self, kinds: tuple[str, ...], innovation: Innovation, noise: Floats) -> Verdict:
         """The verdict on an innovation with R = noise (m, m) whose components are of the given kinds (m,)."""
@@ -50,17 +51,18 @@ class Gate:
         limit = {kind: self._limit(len(at)) for kind, at in rows.items()}
         failed = [kind for kind in rows if nis[kind] > limit[kind]]
         inflation = 1.0
-        run = self._run
+        leading = kinds[0]
+        run = self._runs.get(leading, 0)
         if failed and len(failed) == len(rows):
-            self._run += 1
-            run = self._run
+            run += 1
+            self._runs[leading] = run
             if 0 < self._options.reset_after <= run:
                 # more than enough: the factor acts on the prior's part of S only
                 inflation = 2 * max(nis[kind] / len(rows[kind]) for kind in failed)
                 failed = []
-                self._run = 0
-        elif "position" in rows and "position" not in failed:
-            self._run = 0
+                self._runs[leading] = 0
+        elif leading not in failed:
+            self._runs[leading] = 0
         reasons = {
             kind: f"innovation {nis[kind]:.1f} beyond the gate of {limit[kind]:.1f}" if kind in failed else "" for kind in rows
         }

@@ -11,7 +11,7 @@ from navreplay.timeline import Floats
 
 __all__ = ["Judged", "JudgedRows", "Recorder"]
 
-_UNITS = {"position": "m", "velocity": "m/s", "range": "m", "range_rate": "m/s"}
+_UNITS = {"position": "m", "velocity": "m/s", "range": "m", "range_rate": "m/s", "attitude": "rad", "heading": "rad"}
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -7,12 +7,9 @@ from typing import Any
 import numpy as np
 
 from navreplay.adapt.adapter import NoiseAdapter
-from navreplay.alignment import align
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.filters.calibration import settle_nothing
-from navreplay.filters.consider import Setup, set_up
-from navreplay.filters.fix_aiding import FixAiding
-from navreplay.filters.gate import Gate
+from navreplay.filters.guidance import Guidance, choose_guidance
 from navreplay.filters.linear_log import LinearLog
 from navreplay.filters.presets import Method
 from navreplay.filters.range_aiding import RangeAiding
@@ -21,8 +18,7 @@ from navreplay.filters.record import Recorder
 from navreplay.filters.rows import Rows
 from navreplay.filters.stretches import cut_at_gaps, tell_unreached
 from navreplay.filters.trace import Tracer
-from navreplay.filters.update import Estimator
-from navreplay.heading import Sources
+from navreplay.filters.update import Estimator, Updater
 from navreplay.options import FilterOptions
 from navreplay.solution import Event, Solution
 from navreplay.strapdown import NavState, Steps, idle_steps, make_steps
@@ -34,7 +30,7 @@ Progress = Callable[[float], None]
 
 
 def run_filter(timeline: Timeline, method: Method, options: FilterOptions, progress: Progress | None = None) -> Solution:
-    """The solution over a timeline: of the IMU, by ranges or fixes; without IMU of the antenna, by ranges alone.
+    """The solution over a timeline: of the IMU, by ranges, fixes or attitudes; without IMU of the antenna, by ranges alone.
 
     progress is called with the share done, from 0 to 1. Raises LogError without anything to aid by, or without IMU where there
     are only fixes; on a gap that the options refuse, or when no alignment is possible.
@@ -66,18 +62,16 @@ def _run_passes(
     name = f"{method.name}-smoothed" if options.smooth else method.name
     if timeline.imu is None:
         alone = _choose_ranges_alone(timeline, options, recorder)
-        setup = set_up(alone, method, options)
-        rows = [_run_alone(alone, setup, options, recorder, tracers, _report_of(alone.t_ns, progress))]
-        return _join(rows, f"{name} without IMU", setup.model, recorder)
-    aiding = _choose_aiding(timeline, options, recorder)
-    setup = set_up(aiding, method, options)
+        rows = [_run_alone(alone, method, options, recorder, tracers, _report_of(alone.t_ns, progress))]
+        return _join(rows, f"{name} without IMU", alone.model, recorder)
+    guidance = choose_guidance(timeline, options, recorder)
     stretches = cut_at_gaps(timeline.imu, options.gaps, recorder)
-    tell_unreached(aiding.t_ns, aiding.name, stretches, recorder)
+    tell_unreached(guidance.aiding.t_ns, guidance.aiding.name, stretches, recorder)
     report = _report_of(timeline.imu.t_ns, progress)
     rows = []
     for stretch in stretches:
         try:
-            rows.append(_run_stretch(timeline, aiding, stretch, setup, options, recorder, tracers, report))
+            rows.append(_run_stretch(timeline, guidance, stretch, method, options, recorder, tracers, report))
         except LogError as error:
             if len(stretches) == 1:
                 raise
@@ -86,7 +80,7 @@ def _run_passes(
         report(int(stretch.t_ns[-1]))
     if not rows:
         raise LogError("filter: no stretch of the IMU could be aligned; see the gaps that `navreplay inspect` shows")
-    return _join(rows, name, setup.model, recorder)
+    return _join(rows, name, guidance.model, recorder)
 
 
 def _report_of(t_ns: Times, progress: Progress | None) -> Callable[[int], None]:
@@ -98,17 +92,6 @@ def _report_of(t_ns: Times, progress: Progress | None) -> Callable[[int], None]:
             progress((now_ns - begin) / span)
 
     return report
-
-
-def _choose_aiding(timeline: Timeline, options: FilterOptions, recorder: Recorder) -> FixAiding | RangeAiding:
-    ranges = timeline.ranges if options.use != "fixes" else None
-    if ranges is not None:
-        return RangeAiding(ranges, timeline.fix_lever_b, True, options, recorder)
-    if options.use == "ranges":
-        raise LogError("filter: filter.use is 'ranges', but the log holds none; set it to 'auto', or add the file that does")
-    if timeline.fixes is None:
-        raise LogError("filter: the log holds no GNSS fixes; name them with input.fix.channel, or add the file that holds them")
-    return FixAiding(timeline.fixes, timeline.fix_lever_b, options)
 
 
 def _choose_ranges_alone(timeline: Timeline, options: FilterOptions, recorder: Recorder) -> RangeAiding:
@@ -143,50 +126,48 @@ def _join(rows: list[Rows], method: str, model: ErrorModel, recorder: Recorder) 
 
 def _run_stretch(
     timeline: Timeline,
-    aiding: FixAiding | RangeAiding,
+    guidance: Guidance,
     imu: ImuSeries,
-    setup: Setup,
+    method: Method,
     options: FilterOptions,
     recorder: Recorder,
     tracers: list[Tracer] | None,
     report: Callable[[int], None],
 ) -> Rows:
-    start = align(Sources(imu, aiding.fixes, timeline.attitude, timeline.reference, options.imu_noise, options.alignment))
-    recorder.tell(start.t_ns, "info", start.text)
-    for warning in start.warnings:
-        recorder.tell(start.t_ns, "warning", warning)
-    state, cov = aiding.start(start)
-    gate = Gate(options.gate) if isinstance(aiding, FixAiding) else RangeGate(options.gate)
-    estimator = _traced(setup.estimator(gate, recorder), aiding, tracers)
-    epochs = np.flatnonzero((aiding.t_ns > start.t_ns) & (aiding.t_ns <= imu.t_ns[-1]))
-    nodes = np.union1d(aiding.t_ns[epochs], _output_times(start.t_ns, int(imu.t_ns[-1]), options.output_rate))
-    steps = make_steps(imu, np.append(nodes, start.t_ns)).after(start.t_ns)
-    cov = setup.start_covariance(cov)
-    return _run_epochs(steps, nodes, aiding.t_ns, epochs, state, cov, estimator, setup.model, options, report)
+    start_ns, state, cov = guidance.start(timeline, imu, options, recorder)
+    aiding, model = guidance.aiding, guidance.model
+    updater = Updater(aiding, guidance.gate(options.gate), model, method, recorder)
+    estimator = _traced(updater, model, aiding.t_ns, tracers)
+    epochs = np.flatnonzero((aiding.t_ns > start_ns) & (aiding.t_ns <= imu.t_ns[-1]))
+    nodes = np.union1d(aiding.t_ns[epochs], _output_times(start_ns, int(imu.t_ns[-1]), options.output_rate))
+    steps = make_steps(imu, np.append(nodes, start_ns)).after(start_ns)
+    return _run_epochs(steps, nodes, aiding.t_ns, epochs, state, cov, estimator, model, options, report)
 
 
-def _traced(estimator: Estimator, aiding: FixAiding | RangeAiding, tracers: list[Tracer] | None) -> Estimator:
+def _traced(estimator: Estimator, model: ErrorModel, t_ns: Times, tracers: list[Tracer] | None) -> Estimator:
     """The estimator or, where traces are asked for, one that takes it down."""
     if tracers is None:
         return estimator
-    tracers.append(Tracer(estimator, aiding.model, aiding.t_ns))
+    tracers.append(Tracer(estimator, model, t_ns))
     return tracers[-1]
 
 
 def _run_alone(
     aiding: RangeAiding,
-    setup: Setup,
+    method: Method,
     options: FilterOptions,
     recorder: Recorder,
     tracers: list[Tracer] | None,
     report: Callable[[int], None],
 ) -> Rows:
     start_ns, state, cov = aiding.start_alone()
-    estimator = _traced(setup.estimator(RangeGate(options.gate), recorder), aiding, tracers)
+    updater = Updater(aiding, RangeGate(options.gate), aiding.model, method, recorder)
+    estimator = _traced(updater, aiding.model, aiding.t_ns, tracers)
     epochs = np.flatnonzero(aiding.t_ns > start_ns)
     nodes = np.union1d(aiding.t_ns[epochs], _output_times(start_ns, int(aiding.t_ns[-1]), options.output_rate))
-    cov, steps = setup.start_covariance(cov), idle_steps(start_ns, nodes)
-    return _run_epochs(steps, nodes, aiding.t_ns, epochs, state, cov, estimator, setup.model, options, report)
+    return _run_epochs(
+        idle_steps(start_ns, nodes), nodes, aiding.t_ns, epochs, state, cov, estimator, aiding.model, options, report
+    )
 
 
 def _run_epochs(

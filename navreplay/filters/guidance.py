@@ -1,0 +1,84 @@
+"""What aids a filter: fixes or ranges, attitudes beside them, or attitudes alone."""
+
+from dataclasses import dataclass
+
+from navreplay.alignment import align
+from navreplay.error_models.error_model import ErrorModel
+from navreplay.error_models.ned import NedErrorModel
+from navreplay.filters.attitude_aiding import AttitudeAiding, JointAiding, JointGate
+from navreplay.filters.fix_aiding import FixAiding
+from navreplay.filters.gate import Gate
+from navreplay.filters.range_aiding import RangeAiding
+from navreplay.filters.range_gate import RangeGate
+from navreplay.filters.record import Recorder
+from navreplay.filters.update import Aiding, EpochGate
+from navreplay.heading import Sources
+from navreplay.options import FilterOptions, GateOptions
+from navreplay.strapdown import NavState
+from navreplay.timeline import Floats, ImuSeries, LogError, Timeline
+from navreplay.told_start import start_as_told
+
+__all__ = ["Guidance", "choose_guidance"]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Guidance:
+    """main: what a filter starts from and what decides its error model. aiding: main, joined by attitudes where there are any
+    beside it."""
+
+    main: FixAiding | RangeAiding | AttitudeAiding
+    aiding: Aiding
+
+    @property
+    def model(self) -> ErrorModel:
+        """The error model of the filter."""
+        return self.main.model
+
+    def gate(self, options: GateOptions) -> EpochGate:
+        """A gate for all epochs, with nothing counted yet."""
+        main: EpochGate = RangeGate(options) if isinstance(self.main, RangeAiding) else Gate(options)
+        return main if self.aiding is self.main else JointGate(main, Gate(options))
+
+    def start(
+        self, timeline: Timeline, imu: ImuSeries, options: FilterOptions, recorder: Recorder
+    ) -> tuple[int, NavState, Floats]:
+        """Time, state and covariance (n, n) at which a stretch of the IMU starts; the record tells how. Raises LogError."""
+        if isinstance(self.main, AttitudeAiding):
+            told = start_as_told(timeline, imu, NedErrorModel(options.imu_noise), options)
+            recorder.tell(told.t_ns, "info", told.text)
+            return told.t_ns, told.state, told.cov
+        sources = Sources(imu, self.main.fixes, timeline.attitude, timeline.reference, options.imu_noise, options.alignment)
+        alignment = align(sources)
+        recorder.tell(alignment.t_ns, "info", alignment.text)
+        for warning in alignment.warnings:
+            recorder.tell(alignment.t_ns, "warning", warning)
+        return alignment.t_ns, *self.main.start(alignment)
+
+
+def choose_guidance(timeline: Timeline, options: FilterOptions, recorder: Recorder) -> Guidance:
+    """What the options take of a timeline with IMU. Raises LogError where the log does not hold it."""
+    main: FixAiding | RangeAiding | None = None
+    if timeline.ranges is not None and options.use in ("auto", "ranges"):
+        main = RangeAiding(timeline.ranges, timeline.fix_lever_b, True, options, recorder)
+    elif timeline.fixes is not None and options.use in ("auto", "fixes"):
+        main = FixAiding(timeline.fixes, timeline.fix_lever_b, options)
+    attitude = timeline.attitude if options.attitude.use else None
+    if main is None:
+        if attitude is None or options.use not in ("auto", "attitudes"):
+            raise _nothing_to_use(options)
+        alone = AttitudeAiding(attitude, NedErrorModel(options.imu_noise), options.attitude)
+        return Guidance(alone, alone)
+    if attitude is None:
+        return Guidance(main, main)
+    return Guidance(main, JointAiding(main, AttitudeAiding(attitude, main.model, options.attitude)))
+
+
+def _nothing_to_use(options: FilterOptions) -> LogError:
+    if options.use == "ranges":
+        return LogError("filter: filter.use is 'ranges', but the log holds none; set it to 'auto', or add the file that does")
+    if options.use == "attitudes":
+        return LogError(
+            "filter: filter.use is 'attitudes', but the log holds none to use; name them with input.attitude.channel, with "
+            "attitude.use = true"
+        )
+    return LogError("filter: the log holds no GNSS fixes; name them with input.fix.channel, or add the file that holds them")
