@@ -52,6 +52,10 @@ BANDS = {
     "em-kf-printed": ((2.0, 5.0), (1.2, 3.0)),
     "strong-tracking": ((0.8, 0.95), (0.75, 0.9)),
     "h-infinity": ((0.9, 1.1), (0.95, 1.05)),
+    "ckf": ((0.9, 1.1), (0.95, 1.05)),
+    "hrckf": ((0.9, 1.1), (0.95, 1.05)),
+    "mcsckf": ((0.8, 1.05), (0.7, 0.85)),
+    "mlckf": ((1.1, 1.6), (0.95, 1.05)),
 }
 """By preset, the mean NEES per state and NIS per component that it may have."""
 

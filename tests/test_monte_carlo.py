@@ -15,7 +15,7 @@ from navreplay.options import AlignmentOptions, FilterOptions, GateOptions
 BLOCKS = {"position": slice(0, 3), "velocity": slice(3, 6), "attitude": slice(6, 9)}
 
 
-def run_seeds(scenario: synthetic_logs.Scenario, seeds: range) -> tuple[np.ndarray, np.ndarray]:
+def run_seeds(scenario: synthetic_logs.Scenario, seeds: range, method: str = "fixed") -> tuple[np.ndarray, np.ndarray]:
     """Errors (seeds, k, 9) and covariances (seeds, k, 9, 9) at the rows that lie on the truth's epochs."""
     # these cars do not slip: their course is their heading but for the noise of the velocity
     alignment = AlignmentOptions(course_std=np.radians(0.3))
@@ -24,7 +24,7 @@ def run_seeds(scenario: synthetic_logs.Scenario, seeds: range) -> tuple[np.ndarr
     errors, covariances = [], []
     for seed in seeds:
         log = synthetic_logs.simulate(scenario, seed)
-        solution = run_filter(log.timeline(), build_method("fixed"), options)
+        solution = run_filter(log.timeline(), build_method(method), options)
         rows = np.isin(solution.t_ns, log.truth.t_ns)
         at = np.searchsorted(log.truth.t_ns, solution.t_ns[rows])
         turn = rotation.quat_multiply(log.truth.q_nb[at], rotation.quat_conjugate(solution.q_nb[rows]))
@@ -45,18 +45,20 @@ def calm(scenario: synthetic_logs.Scenario) -> synthetic_logs.Scenario:
 
 
 @pytest.mark.parametrize(
-    ("name", "duration"),
+    ("name", "duration", "method"),
     [
-        ("car-short", 120.0),
-        pytest.param("car-city", 400.0, marks=pytest.mark.slow),
-        pytest.param("uav-flight", 400.0, marks=pytest.mark.slow),
+        ("car-short", 120.0, "fixed"),
+        pytest.param("car-short", 120.0, "ckf", marks=pytest.mark.slow),
+        pytest.param("car-city", 400.0, "fixed", marks=pytest.mark.slow),
+        pytest.param("uav-flight", 400.0, "fixed", marks=pytest.mark.slow),
+        pytest.param("uav-flight", 400.0, "ckf", marks=pytest.mark.slow),
     ],
 )
-def test_nees_lies_in_its_bounds_and_errors_match_the_covariance(name, duration):
+def test_nees_lies_in_its_bounds_and_errors_match_the_covariance(name, duration, method):
     scenario = synthetic_logs.with_duration(synthetic_logs.SCENARIOS[name], duration)
     scenario = calm(scenario) if name == "car-short" else scenario
     seeds = 50
-    errors, covariances = run_seeds(scenario, range(100, 100 + seeds))
+    errors, covariances = run_seeds(scenario, range(100, 100 + seeds), method)
     for block in BLOCKS.values():
         e, p = errors[:, :, block], covariances[:, :, block, block]
         nees = np.einsum("ski,ski->sk", e, np.linalg.solve(p, e[..., None])[..., 0]).mean(axis=0)

@@ -25,6 +25,7 @@ from navreplay.adapt.strong_tracking import StrongTracking
 from navreplay.adapt.student_t import StudentT
 from navreplay.adapt.variational_bayes import VariationalBayes
 from navreplay.filters.calibration import Calibration
+from navreplay.filters.cubature import Cubature
 from navreplay.filters.moments import Linearised, MomentRule
 from navreplay.timeline import LogError
 
@@ -89,6 +90,11 @@ PRESETS: dict[str, Preset] = {
         Preset("em-offline", "R and Q by expectation maximisation over the whole log", Fixed, calibration=EmOffline),
         Preset("strong-tracking", "prior inflated by a fading factor (Zhou and Frank 1996, Lou et al. 2019)", StrongTracking),
         Preset("h-infinity", "prior widened against the worst case (Simon 2006, Zhang et al. 2015)", HInfinity),
+        Preset("ckf", "cubature Kalman filter with the noise it is told (Arasaratnam and Haykin 2009)", Fixed, Cubature),
+        Preset("hrckf", "h-infinity with cubature (Zhang et al. 2015)", HInfinity, Cubature),
+        Preset("mcsckf", "correntropy with cubature (Liu et al. 2018)", Correntropy, Cubature),
+        Preset("mlckf", "ml with cubature (Gao et al. 2021)", MaximumLikelihood, Cubature),
+        Preset("mlckf-ga", "ml-ga with cubature (Gao et al. 2021)", GeneticLikelihood, Cubature),
         Preset("eiakf", "R from innovations, correlated ones taken for AR(1) (Ghaleb et al. 2017)", Eiakf),
         Preset("srmakf", "R from differences of consecutive epochs against the INS (Ge et al. 2020)", Srmakf),
         Preset("ermakf", "srmakf with random weights, and Burg's method where noise is doubtful (Ge et al. 2020)", Ermakf),
