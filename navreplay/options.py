@@ -8,6 +8,7 @@ __all__ = [
     "GRADES",
     "AlignmentOptions",
     "AttitudeOptions",
+    "ConsiderOptions",
     "FilterOptions",
     "GapOptions",
     "GateOptions",
@@ -156,6 +157,25 @@ class MotionOptions:
 
 
 @dataclass(frozen=True, slots=True)
+class ConsiderOptions:
+    """Unknown constant biases that a filter reckons with but does not estimate: standard deviations, NED where there are three,
+    0 where there is none.
+
+    In the measurements: position_bias [m] and velocity_bias [m/s], as if the antenna were displaced by one and drifted with the
+    other, of fixes as of ranges (along each line of sight); zenith_delay [m] of pseudoranges, divided by the sine of the
+    elevation. In the dynamics: position_rate [m/s] and velocity_rate [m/s^2] add to the derivatives of position and velocity.
+    every_method: reckon with them in every method, not in those alone that are made for it.
+    """
+
+    position_bias: tuple[float, float, float] = (1.0, 1.0, 2.0)
+    velocity_bias: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    zenith_delay: float = 0.0
+    position_rate: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    velocity_rate: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    every_method: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class FilterOptions:
     """Everything a filter run is told beside the timeline and the method.
 
@@ -196,3 +216,4 @@ class FilterOptions:
     ranges: RangeOptions = RangeOptions()
     motion: MotionOptions = MotionOptions()
     attitude: AttitudeOptions = AttitudeOptions()
+    consider: ConsiderOptions = ConsiderOptions()

@@ -133,8 +133,8 @@ def correct_ranges(
 ) -> tuple[RangeEpochs, dict[str, int]]:
     """Epochs with delays of the atmosphere taken out, noise filled in and low satellites left out (counted by reason).
 
-    antenna_e: (e, 3) about where the antenna is [m, Earth-fixed]; a kilometre matters little. ranges: where epochs came from,
-    which tells what is corrected already.
+    antenna_e: (e, 3) about where the antenna is [m, Earth-fixed]; a kilometre to the side matters little, ten metres of height
+    are 3 mm of zenith delay. ranges: where epochs came from, which tells what is corrected already.
     """
     lla = earth.lla_from_ecef(antenna_e)[epochs.epoch_of]
     elevation, azimuth = look_angles(lla, epochs.sat_pos_e)

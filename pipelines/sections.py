@@ -10,10 +10,11 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from navreplay.options import GRADES, AlignmentOptions, GapOptions, GateOptions, ImuNoise
+from navreplay.options import GRADES, AlignmentOptions, ConsiderOptions, GapOptions, GateOptions, ImuNoise
 
 __all__ = [
     "AlignmentSection",
+    "ConsiderSection",
     "FilterSection",
     "GapSection",
     "GateSection",
@@ -36,6 +37,7 @@ Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 Vector = tuple[float, float, float]
 Pair = tuple[Positive, Positive]
+Stds = tuple[NotNegative, NotNegative, NotNegative]
 
 
 class Section(BaseModel):
@@ -169,6 +171,34 @@ class FilterSection(Section):
     covariance_interval_s: Positive = Field(0.05, description="longest step of the covariance propagation [s]")
     use_velocity: bool = Field(True, description="use GNSS velocity where the log has it")
     smooth: bool = Field(False, description="smooth: every row from the measurements before and behind it")
+
+
+class ConsiderSection(Section):
+    """Unknown constant biases that eckf and psteckf reckon with but do not estimate: standard deviations, 0 where none."""
+
+    position_bias_std_m: Stds = Field((1.0, 1.0, 2.0), description="of measured positions: [north, east, down] [m]")
+    velocity_bias_std_mps: Stds = Field((0.0, 0.0, 0.0), description="of measured velocities: [north, east, down] [m/s]")
+    zenith_delay_std_m: NotNegative = Field(
+        0.0, description="of pseudoranges, towards the zenith; grows by 1 / sin(elevation) [m]"
+    )
+    position_rate_std_mps: Stds = Field(
+        (0.0, 0.0, 0.0), description="added to the derivative of the position: [north, east, down] [m/s]"
+    )
+    velocity_rate_std_mps2: Stds = Field(
+        (0.0, 0.0, 0.0), description="added to the derivative of the velocity: [north, east, down] [m/s^2]"
+    )
+    every_method: bool = Field(False, description="reckon with them in every method, not in eckf and psteckf alone")
+
+    def options(self) -> ConsiderOptions:
+        """The same for the filter."""
+        return ConsiderOptions(
+            position_bias=self.position_bias_std_m,
+            velocity_bias=self.velocity_bias_std_mps,
+            zenith_delay=self.zenith_delay_std_m,
+            position_rate=self.position_rate_std_mps,
+            velocity_rate=self.velocity_rate_std_mps2,
+            every_method=self.every_method,
+        )
 
 
 class PositionStdSection(Section):

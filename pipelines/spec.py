@@ -21,6 +21,7 @@ from navreplay.timeline import LogError
 from pipelines.range_sections import MotionSection, RangeSection
 from pipelines.sections import (
     AlignmentSection,
+    ConsiderSection,
     FilterSection,
     GapSection,
     GateSection,
@@ -45,6 +46,7 @@ class Config(Section):
     gate: GateSection = GateSection()
     gaps: GapSection = GapSection()
     filter: FilterSection = FilterSection()
+    consider: ConsiderSection = ConsiderSection()
     gnss: GnssSection = GnssSection()
     range: RangeSection = RangeSection()
     motion: MotionSection = MotionSection()
@@ -73,6 +75,7 @@ def filter_options(config: Config) -> FilterOptions:
         use=config.filter.use,
         ranges=config.range.options(),
         motion=config.motion.options(),
+        consider=config.consider.options(),
     )
 
 

@@ -19,6 +19,7 @@ from navreplay.adapt.huber import Huber
 from navreplay.adapt.iae import Iae
 from navreplay.adapt.iae_q import IaeQ
 from navreplay.adapt.maximum_likelihood import GeneticLikelihood, MaximumLikelihood
+from navreplay.adapt.partial_tracking import PartialTracking
 from navreplay.adapt.sage_husa import SageHusa
 from navreplay.adapt.srmakf import Srmakf
 from navreplay.adapt.strong_tracking import StrongTracking
@@ -34,34 +35,43 @@ __all__ = ["PRESETS", "Method", "Preset", "build_method"]
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """What the epoch loop runs. name: of the preset. calibration: where the noise is first estimated from the whole log."""
+    """What the epoch loop runs. name: of the preset. calibration: where the noise is first estimated from the whole log.
+    considers: with biases that are not estimated (see `navreplay.filters.consider`). tracking: inflates the prior before the
+    adapter sees it."""
 
     name: str
     rule: MomentRule
     adapter: NoiseAdapter[Any]
     calibration: Calibration | None = None
+    considers: bool = False
+    tracking: PartialTracking | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Preset:
-    """name, one line of description, and the types of adapter, moment rule and calibration, whose fields are the parameters."""
+    """name, one line of description, and the types of adapter, moment rule, calibration and tracking, whose fields are the
+    parameters."""
 
     name: str
     description: str
     adapter: Callable[..., NoiseAdapter[Any]]
     rule: Callable[..., MomentRule] = Linearised
     calibration: Callable[..., Calibration] | None = None
+    considers: bool = False
+    tracking: Callable[..., PartialTracking] | None = None
 
     @property
     def parameters(self) -> dict[str, Any]:
         """Names and defaults of the parameters."""
-        return _defaults(self.adapter) | _defaults(self.rule) | (_defaults(self.calibration) if self.calibration else {})
+        parts = (self.adapter, self.rule, self.calibration, self.tracking)
+        return {name: default for part in parts if part for name, default in _defaults(part).items()}
 
     def build(self, parameters: Mapping[str, object]) -> Method:
         """The method with parameters, all of them known, replaced."""
         rule, adapter = (_share_of(part, parameters) for part in (self.rule, self.adapter))
         calibration = self.calibration(**_share_of(self.calibration, parameters)) if self.calibration else None
-        return Method(self.name, self.rule(**rule), self.adapter(**adapter), calibration)
+        tracking = self.tracking(**_share_of(self.tracking, parameters)) if self.tracking else None
+        return Method(self.name, self.rule(**rule), self.adapter(**adapter), calibration, self.considers, tracking)
 
 
 def _defaults(part: Callable[..., Any]) -> dict[str, Any]:
@@ -76,6 +86,9 @@ PRESETS: dict[str, Preset] = {
     preset.name: preset
     for preset in (
         Preset("fixed", "extended Kalman filter with the noise it is told", Fixed),
+        Preset("ekf", "extended Kalman filter in the direct formulation: the same as fixed (Lou et al. 2019)", Fixed),
+        Preset("eckf", "biases reckoned with but not estimated (Schmidt 1966, Lou et al. 2019)", Fixed, considers=True),
+        Preset("psteckf", "eckf with a fading factor on P (Lou et al. 2019)", Fixed, considers=True, tracking=PartialTracking),
         Preset("iae", "R from the innovations of a window (Mohamed and Schwarz 1999)", Iae),
         Preset("iae-q", "R and Q from corrections and residuals of a window (Mohamed and Schwarz 1999)", IaeQ),
         Preset("sage-husa", "R as a fading mean over the innovations (Sage and Husa 1969)", SageHusa),

@@ -9,6 +9,7 @@ import numpy as np
 from navreplay.adapt.adapter import NoiseAdapter
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.filters.calibration import settle_nothing
+from navreplay.filters.consider import Setup, set_up
 from navreplay.filters.guidance import Guidance, choose_guidance
 from navreplay.filters.linear_log import LinearLog
 from navreplay.filters.presets import Method
@@ -18,7 +19,7 @@ from navreplay.filters.record import Recorder
 from navreplay.filters.rows import Rows
 from navreplay.filters.stretches import cut_at_gaps, tell_unreached
 from navreplay.filters.trace import Tracer
-from navreplay.filters.update import Estimator, Updater
+from navreplay.filters.update import Estimator
 from navreplay.options import FilterOptions
 from navreplay.solution import Event, Solution
 from navreplay.strapdown import NavState, Steps, idle_steps, make_steps
@@ -62,16 +63,18 @@ def _run_passes(
     name = f"{method.name}-smoothed" if options.smooth else method.name
     if timeline.imu is None:
         alone = _choose_ranges_alone(timeline, options, recorder)
-        rows = [_run_alone(alone, method, options, recorder, tracers, _report_of(alone.t_ns, progress))]
-        return _join(rows, f"{name} without IMU", alone.model, recorder)
+        setup = set_up(alone, alone.model, method, options)
+        rows = [_run_alone(alone, setup, options, recorder, tracers, _report_of(alone.t_ns, progress))]
+        return _join(rows, f"{name} without IMU", setup.model, recorder)
     guidance = choose_guidance(timeline, options, recorder)
+    setup = set_up(guidance.aiding, guidance.model, method, options)
     stretches = cut_at_gaps(timeline.imu, options.gaps, recorder)
     tell_unreached(guidance.aiding.t_ns, guidance.aiding.name, stretches, recorder)
     report = _report_of(timeline.imu.t_ns, progress)
     rows = []
     for stretch in stretches:
         try:
-            rows.append(_run_stretch(timeline, guidance, stretch, method, options, recorder, tracers, report))
+            rows.append(_run_stretch(timeline, guidance, stretch, setup, options, recorder, tracers, report))
         except LogError as error:
             if len(stretches) == 1:
                 raise
@@ -80,7 +83,7 @@ def _run_passes(
         report(int(stretch.t_ns[-1]))
     if not rows:
         raise LogError("filter: no stretch of the IMU could be aligned; see the gaps that `navreplay inspect` shows")
-    return _join(rows, name, guidance.model, recorder)
+    return _join(rows, name, setup.model, recorder)
 
 
 def _report_of(t_ns: Times, progress: Progress | None) -> Callable[[int], None]:
@@ -128,20 +131,20 @@ def _run_stretch(
     timeline: Timeline,
     guidance: Guidance,
     imu: ImuSeries,
-    method: Method,
+    setup: Setup,
     options: FilterOptions,
     recorder: Recorder,
     tracers: list[Tracer] | None,
     report: Callable[[int], None],
 ) -> Rows:
     start_ns, state, cov = guidance.start(timeline, imu, options, recorder)
-    aiding, model = guidance.aiding, guidance.model
-    updater = Updater(aiding, guidance.gate(options.gate), model, method, recorder)
-    estimator = _traced(updater, model, aiding.t_ns, tracers)
+    aiding = guidance.aiding
+    estimator = _traced(setup.estimator(guidance.gate(options.gate), recorder), guidance.model, aiding.t_ns, tracers)
     epochs = np.flatnonzero((aiding.t_ns > start_ns) & (aiding.t_ns <= imu.t_ns[-1]))
     nodes = np.union1d(aiding.t_ns[epochs], _output_times(start_ns, int(imu.t_ns[-1]), options.output_rate))
     steps = make_steps(imu, np.append(nodes, start_ns)).after(start_ns)
-    return _run_epochs(steps, nodes, aiding.t_ns, epochs, state, cov, estimator, model, options, report)
+    cov = setup.start_covariance(cov)
+    return _run_epochs(steps, nodes, aiding.t_ns, epochs, state, cov, estimator, setup.model, options, report)
 
 
 def _traced(estimator: Estimator, model: ErrorModel, t_ns: Times, tracers: list[Tracer] | None) -> Estimator:
@@ -154,20 +157,18 @@ def _traced(estimator: Estimator, model: ErrorModel, t_ns: Times, tracers: list[
 
 def _run_alone(
     aiding: RangeAiding,
-    method: Method,
+    setup: Setup,
     options: FilterOptions,
     recorder: Recorder,
     tracers: list[Tracer] | None,
     report: Callable[[int], None],
 ) -> Rows:
     start_ns, state, cov = aiding.start_alone()
-    updater = Updater(aiding, RangeGate(options.gate), aiding.model, method, recorder)
-    estimator = _traced(updater, aiding.model, aiding.t_ns, tracers)
+    estimator = _traced(setup.estimator(RangeGate(options.gate), recorder), aiding.model, aiding.t_ns, tracers)
     epochs = np.flatnonzero(aiding.t_ns > start_ns)
     nodes = np.union1d(aiding.t_ns[epochs], _output_times(start_ns, int(aiding.t_ns[-1]), options.output_rate))
-    return _run_epochs(
-        idle_steps(start_ns, nodes), nodes, aiding.t_ns, epochs, state, cov, estimator, aiding.model, options, report
-    )
+    cov, steps = setup.start_covariance(cov), idle_steps(start_ns, nodes)
+    return _run_epochs(steps, nodes, aiding.t_ns, epochs, state, cov, estimator, setup.model, options, report)
 
 
 def _run_epochs(

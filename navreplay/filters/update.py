@@ -127,7 +127,7 @@ class Updater:
             return Updated(state, cov, state, cov, RowStatus.PREDICTED, observed)
         t_ns = int(self._aiding.t_ns[epoch])
         rule, adapter = self._method.rule, self._method.adapter
-        prior = Gaussian(self._zero, cov)
+        prior = Gaussian(self._zero, self._prior_covariance(cov, measurement))
         innovation = rule.innovate(prior, measurement)._replace(t_ns=t_ns, leftover=self._leftover)
         labels = innovation.labels
         adapted, noise, self._adapter_state = adapter.adapt(self._adapter_state, prior, innovation)
@@ -153,6 +153,10 @@ class Updater:
         self._leave(t_ns, labels, measurement.residual - measurement.jacobian @ posterior.mean)
         moved = self._model.retract(state, posterior.mean)
         return Updated(moved, posterior.cov, state, adapted.cov, RowStatus.UPDATED, observed)
+
+    def _prior_covariance(self, cov: Floats, measurement: Measurement) -> Floats:
+        """What an epoch starts from, of the propagated cov (n, n)."""
+        return cov
 
     def _leave(self, t_ns: int, labels: tuple[str, ...], residual: Floats) -> None:
         self._leftover = Leftover(t_ns, dict(zip(labels, residual.tolist(), strict=True)))
