@@ -16,10 +16,10 @@ from navreplay.filters.run import run_filter
 from navreplay.metrics import evaluate
 from navreplay.options import FilterOptions
 from navreplay.solution import Solution
-from navreplay.timeline import Floats, LogError, Times, Trajectory
+from navreplay.timeline import Floats, LogError, Times
 from pipelines.restarted import Restarted
 from pipelines.told_noise import Knowledge, NoiseRatio, StartErrors, compare_noise, displace_start, tell
-from synthetic_logs.simulation import Scenario, SyntheticLog, simulate
+from synthetic_logs.simulation import Journey, Scenario, SyntheticLog, simulate, truth_at
 
 __all__ = [
     "QUANTITIES",
@@ -189,7 +189,7 @@ def _single_threaded() -> Iterator[None]:
 def run_seed(experiment: Experiment, seed: int) -> Outcome:
     """All arms on the log of one seed. An arm that a LogError stops is a failure of that arm."""
     log = simulate(experiment.scenario, seed)
-    t_ns = _judged_epochs(log)
+    t_ns = _judged_epochs(experiment.scenario.journey)
     arms, failures, seconds = {}, {}, {}
     for arm in experiment.arms:
         timeline, method = tell(log, arm.told), _build(arm, log)
@@ -214,16 +214,13 @@ def _build(arm: Arm, log: SyntheticLog) -> Method:
     return replace(method, adapter=Restarted(method.adapter, tuple(start_ns + round(t_s * 1e9) for t_s in arm.restarts)))
 
 
-def _judged_epochs(log: SyntheticLog) -> Times:
+def _judged_epochs(journey: Journey) -> Times:
     """Once a second, on the half second: between the epochs of a receiver that measures on the second."""
-    t_ns = log.truth.t_ns
-    return t_ns[(t_ns % 1_000_000_000) == 500_000_000]
+    return journey.start_ns + 500_000_000 + np.arange(int(journey.duration - 0.5) + 1, dtype=np.int64) * 1_000_000_000
 
 
 def _judge(solution: Solution, log: SyntheticLog, t_ns: Times) -> ArmOutcome:
-    rows = np.isin(log.truth.t_ns, t_ns)
-    truth = log.truth
-    reference = Trajectory(t_ns, truth.lla[rows], truth.vel_n[rows], truth.q_nb[rows], truth.cov_pos[rows])
+    reference = truth_at(log.scenario.journey, t_ns)
     evaluation = evaluate(solution, reference)
     at = np.searchsorted(t_ns, evaluation.t_ns)
     errors, nees = np.full((len(t_ns), 9), np.nan), np.full((len(t_ns), 3), np.nan)

@@ -1,0 +1,63 @@
+"""Gao et al. (2021), section 4.1: from 500 to 700 s filters are told 16 R, while the noise stays what it was."""
+
+from pipelines.experiment import Arm, Experiment, NoiseClaim, Published, PublishedNoise, Stretch
+from pipelines.experiments.mlckf_flight import ARCMIN_DEG, NOTES, OPTIONS, PAPER, START, fly
+
+__all__ = ["MLCKF_INACCURATE_R"]
+
+_COMPONENTS = ("velocity east", "velocity north", "velocity down", "position east", "position north", "position down")
+_TOLD = (500.0, 700.0)
+# the true ratio, 1/16, would lie at the default floor of 0.05
+_FLOOR = {"floor": 1e-3}
+
+
+def _table(arm: str, *figures: float) -> PublishedNoise:
+    return PublishedNoise("table 1", "told 16 R", arm, dict(zip(_COMPONENTS, figures, strict=True)))
+
+
+def _published(source: str, quantity: str, ckf: float, hrckf: float, mlckf: float) -> Published:
+    return Published(source, "told 16 R", quantity, {"CKF": ckf, "HRCKF": hrckf, "MLCKF": mlckf})
+
+
+MLCKF_INACCURATE_R = Experiment(
+    name="mlckf-inaccurate-r",
+    description="R by maximum likelihood in a cubature filter that is told 16 R for a while",
+    paper=PAPER,
+    scenario=fly("told-noise"),
+    options=OPTIONS,
+    arms=(
+        Arm("CKF", "ckf"),
+        Arm("HRCKF", "hrckf"),
+        Arm("MCSCKF", "mcsckf"),
+        Arm("MLCKF", "mlckf", _FLOOR, restarts=_TOLD),
+        Arm("MLCKF, all epochs", "mlckf", _FLOOR | {"window": 1000}, restarts=_TOLD),
+        Arm("MLCKF-GA", "mlckf-ga", _FLOOR, restarts=_TOLD),
+        Arm("EKF", "fixed"),
+        Arm("correntropy", "correntropy"),
+        Arm("moment oracle", "fixed", told="moments"),
+        Arm("clairvoyant", "fixed", told="model"),
+    ),
+    stretches=(Stretch("told R", ((200.0, 500.0),)), Stretch("told 16 R", (_TOLD,))),
+    drawn=("CKF", "HRCKF", "MCSCKF", "MLCKF", "MLCKF-GA", "moment oracle"),
+    published=(
+        _published("section 4.1.2", "attitude", 0.82 * ARCMIN_DEG, 0.71 * ARCMIN_DEG, 0.55 * ARCMIN_DEG),
+        _published("section 4.1.2", "velocity", 0.53, 0.41, 0.29),
+        _published("section 4.1.2", "position", 19.17, 16.31, 13.29),
+    ),
+    published_noise=(
+        _table("MLCKF", 0.0031, 0.0032, 0.0036, 24.7801, 25.0178, 64.8577),
+        _table("MLCKF-GA", 0.0054, 0.0056, 0.0053, 27.2759, 27.9192, 68.8187),
+    ),
+    noise_claims=(
+        NoiseClaim("SQP finds R of the positions", "told 16 R", "position", "MLCKF", 0.8, 1.25),
+        NoiseClaim("SQP finds R of the velocities", "told 16 R", "velocity", "MLCKF", 0.8, 1.25),
+        NoiseClaim("the genetic algorithm overestimates R", "told 16 R", "velocity", "MLCKF-GA", 1.25, 10.0),
+    ),
+    start=START,
+    notes=(
+        *NOTES,
+        "Maximum likelihood is restarted with an empty history at 500 s, from 16 R, and again at 700 s, from R; else it would "
+        "never see the wrong value. It holds what it is told for 15 epochs, which the mean over 200 s contains, with 16 R. Its "
+        "window is 50 epochs; 'all epochs' is the paper's sum from the first one on.",
+    ),
+)
