@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from navreplay.timeline import Floats, Times
 
-__all__ = ["Event", "InnovationSeries", "Outage", "OutageCause", "RowStatus", "Solution"]
+__all__ = ["Event", "InnovationSeries", "Outage", "OutageCause", "RowStatus", "Solution", "WeightSeries"]
 
 OutageCause = Literal["simulated", "no fixes", "fixes rejected"]
 """The configuration withheld the fixes, the log has none, or the filter refused them."""
@@ -49,6 +49,16 @@ class InnovationSeries:
     sources: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class WeightSeries:
+    """Weights of a bank's hypotheses after its measurement epochs. t_ns: (k,). labels: one per hypothesis. values: (k, M), of
+    which each row sums to one."""
+
+    t_ns: Times
+    labels: tuple[str, ...]
+    values: Floats
+
+
 @dataclass(frozen=True, slots=True)
 class Event:
     """Something worth telling at a time: alignment, gap, run of rejections, reset. level: ``info`` or ``warning``."""
@@ -75,7 +85,7 @@ class Solution:
     accel_bias: (k, 3) [m/s^2]. cov: (k, n, n) of the error state in the order of state_names; the first nine are position
     NED [m], velocity NED [m/s] and rotation vector in n [rad] (true attitude = exp(phi x) computed attitude).
     status: (k,) int8 of RowStatus. method: name of the preset. estimated: figures of the noise that a method found in the whole
-    log and filtered with, by their names in `FilterOptions` and what it holds; empty for other methods.
+    log and filtered with, by their names in `FilterOptions` and what it holds; empty for other methods. weights: of a bank.
     """
 
     t_ns: Times
@@ -93,6 +103,7 @@ class Solution:
     events: tuple[Event, ...] = ()
     outages: tuple[Outage, ...] = ()
     estimated: Mapping[str, float] = field(default_factory=dict)
+    weights: WeightSeries | None = None
 
     def __len__(self) -> int:
         return len(self.t_ns)

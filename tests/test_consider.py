@@ -12,7 +12,7 @@ from navreplay.error_models.ned import NedErrorModel
 from navreplay.filters.consider import Schmidt
 from navreplay.filters.core import Gaussian, chi_square, condition, kalman_gain
 from navreplay.filters.moments import Linearised
-from navreplay.filters.presets import PRESETS, build_method
+from navreplay.filters.presets import PRESETS, Preset, build_method
 from navreplay.filters.run import run_filter
 from navreplay.measurements import Measurement
 from navreplay.metrics import evaluate
@@ -258,7 +258,7 @@ def test_a_bias_that_is_considered_is_covered_and_one_that_is_not_is_not():
 
 
 @pytest.mark.parametrize(
-    "name", [name for name, preset in PRESETS.items() if preset.rule is Linearised and preset.calibration is None]
+    "name", [n for n, p in PRESETS.items() if isinstance(p, Preset) and p.rule is Linearised and p.calibration is None]
 )
 def test_every_adapter_runs_with_biases(log, name):
     chosen = options(consider=replace(ALL_BIASES, zenith_delay=0.0, every_method=True))
@@ -285,7 +285,9 @@ def test_smoothing_is_refused(log):
 
 
 def test_a_method_that_calibrates_first_is_refused(log):
-    with pytest.raises(LogError, match=r"consider parameters need a method .* 'em-offline' is not; set consider.every_method"):
+    with pytest.raises(
+        LogError, match=r"consider parameters need a single filter .* 'em-offline' is not; set consider.every_method"
+    ):
         run_filter(log.timeline(), build_method("em-offline"), options(consider=replace(ALL_BIASES, every_method=True)))
 
 

@@ -19,11 +19,12 @@ from navreplay.adapt.partial_tracking import PartialTracking
 from navreplay.error_models.considered import ConsideredModel
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.error_models.ned import Propagated
+from navreplay.filters.bank import Bank
 from navreplay.filters.core import Gaussian, Innovation, condition, kalman_gain
 from navreplay.filters.moments import Linearised, MomentRule
 from navreplay.filters.presets import Method
 from navreplay.filters.record import Recorder
-from navreplay.filters.update import Aiding, EpochGate, Observed, Updater
+from navreplay.filters.update import Aiding, EpochGate, Estimator, Observed, Updater
 from navreplay.measurements import Measurement
 from navreplay.options import FilterOptions
 from navreplay.strapdown import NavState, Steps
@@ -140,8 +141,10 @@ class Setup(NamedTuple):
         """Of the model's states, where those that aiding starts from have covariance cov (n, n)."""
         return self.model.start_covariance(cov) if isinstance(self.model, ConsideredModel) else cov
 
-    def estimator(self, gate: EpochGate, recorder: Recorder) -> Updater:
+    def estimator(self, gate: EpochGate, recorder: Recorder) -> Estimator:
         """A filter at the start of a stretch."""
+        if self.method.weighting is not None:
+            return Bank(self.aiding, gate, self.model, self.method, self.method.weighting, recorder)
         tracking = self.method.tracking
         if tracking is None or not isinstance(self.model, ConsideredModel):
             return Updater(self.aiding, gate, self.model, self.method, recorder)
@@ -160,9 +163,9 @@ def set_up(aiding: Aiding, model: ErrorModel, method: Method, options: FilterOpt
             f"filter: '{method.name}' considers biases that it does not estimate, and such a solution cannot be smoothed; set "
             "filter.smooth = false, or take a method without consider parameters"
         )
-    if not isinstance(method.rule, Linearised) or method.calibration is not None:
+    if not isinstance(method.rule, Linearised) or method.calibration is not None or method.weighting is not None:
         raise LogError(
-            "filter: consider parameters need a method that is of first order and goes over the log once, which "
+            "filter: consider parameters need a single filter of first order that goes over the log once, which "
             f"'{method.name}' is not; set consider.every_method = false, or take 'eckf'"
         )
     considered = ConsideredModel.of(model, options.consider)

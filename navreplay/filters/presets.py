@@ -28,16 +28,17 @@ from navreplay.adapt.variational_bayes import VariationalBayes
 from navreplay.filters.calibration import Calibration
 from navreplay.filters.cubature import Cubature
 from navreplay.filters.moments import Linearised, MomentRule
+from navreplay.filters.weights import Immae, Mmae, MmaeFloor
 from navreplay.timeline import LogError
 
-__all__ = ["PRESETS", "Method", "Preset", "build_method"]
+__all__ = ["PRESETS", "BankPreset", "Method", "Preset", "build_method"]
 
 
 @dataclass(frozen=True, slots=True)
 class Method:
     """What the epoch loop runs. name: of the preset. calibration: where the noise is first estimated from the whole log.
     considers: with biases that are not estimated (see `navreplay.filters.consider`). tracking: inflates the prior before the
-    adapter sees it."""
+    adapter sees it. weighting: of a bank of which rule and adapter make each hypothesis."""
 
     name: str
     rule: MomentRule
@@ -45,6 +46,7 @@ class Method:
     calibration: Calibration | None = None
     considers: bool = False
     tracking: PartialTracking | None = None
+    weighting: Mmae | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +63,7 @@ class Preset:
     tracking: Callable[..., PartialTracking] | None = None
 
     @property
-    def parameters(self) -> dict[str, Any]:
+    def parameters(self) -> Mapping[str, Any]:
         """Names and defaults of the parameters."""
         parts = (self.adapter, self.rule, self.calibration, self.tracking)
         return {name: default for part in parts if part for name, default in _defaults(part).items()}
@@ -74,6 +76,32 @@ class Preset:
         return Method(self.name, self.rule(**rule), self.adapter(**adapter), calibration, self.considers, tracking)
 
 
+@dataclass(frozen=True, slots=True)
+class BankPreset:
+    """name, one line of description, and the type of the weighting, whose fields are the parameters."""
+
+    name: str
+    description: str
+    weighting: Callable[..., Mmae]
+
+    @property
+    def parameters(self) -> Mapping[str, Any]:
+        """Names and defaults of the parameters."""
+        return _defaults(self.weighting)
+
+    def build(self, parameters: Mapping[str, object]) -> Method:
+        """The method with parameters, all of them known, replaced. Raises LogError where a bank cannot be made of the inner
+        method."""
+        weighting = self.weighting(**parameters)
+        inner = build_method(weighting.inner)
+        if inner != Method(inner.name, Linearised(), inner.adapter):
+            raise LogError(
+                f"filter '{self.name}': parameter 'inner' cannot be '{inner.name}'; take 'fixed' or a method of first order "
+                "that does no more than adapt the noise"
+            )
+        return Method(self.name, inner.rule, inner.adapter, weighting=weighting)
+
+
 def _defaults(part: Callable[..., Any]) -> dict[str, Any]:
     return {field.name: field.default for field in fields(part)}  # type: ignore[arg-type]
 
@@ -82,7 +110,7 @@ def _share_of(part: Callable[..., Any], parameters: Mapping[str, Any]) -> dict[s
     return {name: parameters[name] for name in _defaults(part) if name in parameters}
 
 
-PRESETS: dict[str, Preset] = {
+PRESETS: dict[str, Preset | BankPreset] = {
     preset.name: preset
     for preset in (
         Preset("fixed", "extended Kalman filter with the noise it is told", Fixed),
@@ -113,6 +141,9 @@ PRESETS: dict[str, Preset] = {
         Preset("ermakf", "srmakf with random weights, and Burg's method where noise is doubtful (Ge et al. 2020)", Ermakf),
         Preset("ermakf-derived", "R from differences over several epochs, fitted for variance and correlation", ErmakfDerived),
         Preset("ermakf-whitened", "ermakf-derived with R enlarged for noise that stays", ErmakfWhitened),
+        BankPreset("mmae", "bank of filters with scaled Q or R, weighted by likelihood (Magill 1965)", Mmae),
+        BankPreset("mmae-floor", "the same with a floor under the weights (Maybeck 1982)", MmaeFloor),
+        BankPreset("immae", "the same, weights made even when recent measurements contradict them (Si et al.)", Immae),
     )
 }
 
@@ -126,16 +157,33 @@ def build_method(name: str, parameters: Mapping[str, object] | None = None) -> M
         raise LogError(f"filter: there is no '{name}'; {_suggest(name, list(PRESETS))}")
     preset = PRESETS[name]
     defaults = preset.parameters
+    checked: dict[str, object] = {}
     for key, value in (parameters or {}).items():
         if key not in defaults:
             raise LogError(f"filter '{name}': there is no parameter '{key}'; {_suggest(key, list(defaults))}")
-        _check_number(name, key, value, defaults[key])
-    return preset.build(parameters or {})
+        checked[key] = _check_value(name, key, value, defaults[key])
+    return preset.build(checked)
 
 
 def _suggest(wrong: str, known: list[str]) -> str:
     near = get_close_matches(wrong, known, n=1)
     return f"did you mean '{near[0]}'?" if near else f"known are: {', '.join(known) or 'none'}"
+
+
+def _check_value(name: str, key: str, value: object, default: object) -> object:
+    """value where it is of the kind of default: a name, numbers (as a tuple) or a number."""
+    if isinstance(default, str):
+        if not isinstance(value, str):
+            raise LogError(f"filter '{name}': parameter '{key}' must be a name in quotes, got {value!r}")
+        return value
+    if not isinstance(default, tuple):
+        _check_number(name, key, value, default)
+        return value
+    if not isinstance(value, list | tuple) or not value:
+        raise LogError(f"filter '{name}': parameter '{key}' must be a list of numbers such as [1, 10], got {value!r}")
+    for one in value:
+        _check_number(name, key, one, default[0])
+    return tuple(value)
 
 
 def _check_number(name: str, key: str, value: object, default: object) -> None:

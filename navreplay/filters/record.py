@@ -6,7 +6,7 @@ from itertools import chain
 import numpy as np
 
 from navreplay.filters.core import Innovation
-from navreplay.solution import Event, InnovationSeries
+from navreplay.solution import Event, InnovationSeries, WeightSeries
 from navreplay.timeline import Floats
 
 __all__ = ["Judged", "JudgedRows", "Recorder"]
@@ -46,6 +46,8 @@ class Recorder:
     judged: dict[str, list[Judged]] = field(default_factory=dict)
     rows: dict[str, list[JudgedRows]] = field(default_factory=dict)
     events: list[Event] = field(default_factory=list)
+    labels: tuple[str, ...] = ()
+    weights: list[tuple[int, Floats]] = field(default_factory=list)
 
     def add(self, t_ns: int, kind: str, judged: Judged) -> None:
         """One kind's innovation at t_ns."""
@@ -60,6 +62,18 @@ class Recorder:
     def tell(self, t_ns: int, level: str, text: str) -> None:
         """An event at t_ns."""
         self.events.append(Event(t_ns, level, text))
+
+    def weigh(self, t_ns: int, labels: tuple[str, ...], weights: Floats) -> None:
+        """Weights (M,) of a bank's hypotheses at t_ns, the same labels at every epoch."""
+        self.labels = labels
+        self.weights.append((t_ns, weights))
+
+    def weight_series(self) -> WeightSeries | None:
+        """All weights; None where no bank ran."""
+        if not self.weights:
+            return None
+        t_ns, values = zip(*self.weights, strict=True)
+        return WeightSeries(np.array(t_ns, dtype=np.int64), self.labels, np.array(values))
 
     def series(self) -> tuple[InnovationSeries, ...]:
         """All innovations, a series per kind."""

@@ -123,6 +123,7 @@ def _join(rows: list[Rows], method: str, model: ErrorModel, recorder: Recorder) 
         state_units=model.units,
         method=method,
         innovations=recorder.series(),
+        weights=recorder.weight_series(),
         events=tuple(sorted(recorder.events, key=lambda event: event.t_ns)),
     )
 

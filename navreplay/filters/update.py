@@ -14,7 +14,7 @@ from navreplay.solution import RowStatus
 from navreplay.strapdown import NavState, Steps
 from navreplay.timeline import Floats, Times
 
-__all__ = ["Aiding", "EpochGate", "Estimator", "Observed", "Updated", "Updater", "Verdict"]
+__all__ = ["Aiding", "EpochGate", "Estimator", "Observed", "Updated", "Updater", "Verdict", "tell_inflation"]
 
 
 class Observed(NamedTuple):
@@ -100,6 +100,12 @@ class Estimator(Protocol):
         ...
 
 
+def tell_inflation(recorder: Recorder, t_ns: int, aiding: Aiding, verdict: Verdict) -> None:
+    """Records that a gate was reopened."""
+    text = f"{aiding.name} were rejected {verdict.run} epochs in a row; covariance times {verdict.inflation:.1f}"
+    recorder.tell(t_ns, "warning", text)
+
+
 class Updater:
     """The single filter, with one kind of aiding. Keeps the state of the adapter, the gate, and the record."""
 
@@ -137,9 +143,7 @@ class Updater:
         if verdict.inflation > 1:
             adapted = Gaussian(self._zero, adapted.cov * verdict.inflation)
             innovation = rule.innovate(adapted, measurement)
-            name, run = self._aiding.name, verdict.run
-            text = f"{name} were rejected {run} epochs in a row; covariance times {verdict.inflation:.1f}"
-            self._recorder.tell(t_ns, "warning", text)
+            tell_inflation(self._recorder, t_ns, self._aiding, verdict)
             if not len(verdict.passed):
                 verdict = self._gate.judge(measurement.kinds, innovation, noise)
         verdict.record(self._recorder, t_ns, measurement.kinds, innovation, noise)

@@ -1,0 +1,199 @@
+"""A bank of filters that differ in the scale of Q or R and share one mechanisation: multiple-model adaptive estimation.
+
+Source: Magill, IEEE Trans. Automatic Control 10 (1965) 434; Si, Wang and Niu, High precision attitude estimation algorithm for
+SINS/CNS integrated navigation with unknown noise characteristics, eqs. (8)-(18). Each hypothesis has an error mean d_j and a
+covariance P_j about the one nominal state, moved by the one Phi and Q of the mechanisation:
+    d_j <- Phi d_j ;  P_j <- Phi P_j Phi' + theta_j Q ;  output P = sum w_j (P_j + (d_j - d) (d_j - d)'),  d = sum w_j d_j
+After an epoch d moves into the nominal and is subtracted from every d_j; their differences and the P_j stay. Between epochs
+d = 0 and P <- Phi P Phi' + (sum w_j theta_j) Q, which needs no hypothesis.
+Assumes: hypotheses stay close enough to the nominal for one Phi, which holds wherever the single filter's linearisation does.
+What must hold of the weights, and when they fail: `navreplay.filters.weights`.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from navreplay.adapt.fixed import Fixed
+from navreplay.error_models.error_model import ErrorModel
+from navreplay.error_models.ned import Propagated
+from navreplay.filters.core import Gaussian, Leftover, symmetric
+from navreplay.filters.presets import Method
+from navreplay.filters.record import Recorder
+from navreplay.filters.update import Aiding, EpochGate, Updated, tell_inflation
+from navreplay.filters.weights import Mmae
+from navreplay.measurements import Measurement
+from navreplay.solution import RowStatus
+from navreplay.strapdown import NavState, Steps
+from navreplay.timeline import Floats, LogError
+
+__all__ = ["Bank", "Stack", "Update", "mix", "move_stack", "update_stack"]
+
+_LEADS = 0.9
+"""Weight above which a hypothesis is told to lead."""
+
+
+class Stack(NamedTuple):
+    """means (M, n) and covs (M, n, n) of the hypotheses' errors about the common nominal state."""
+
+    means: Floats
+    covs: Floats
+
+
+class Update(NamedTuple):
+    """The hypotheses after a measurement, and its log_likelihood (M,) under each, but for a constant."""
+
+    stack: Stack
+    log_likelihood: Floats
+
+
+def mix(stack: Stack, weights: Floats) -> Gaussian:
+    """Moments of the mixture with weights (M,): Si et al., eqs. (17)-(18)."""
+    mean = weights @ stack.means
+    apart = stack.means - mean
+    return Gaussian(mean, _average(weights, stack.covs) + (weights * apart.T) @ apart)
+
+
+def _average(weights: Floats, matrices: Floats) -> Floats:
+    """(a, b) average of matrices (M, a, b) with weights (M,); tensordot would take three times as long."""
+    return np.asarray((weights @ matrices.reshape(len(weights), -1)).reshape(matrices.shape[1:]))
+
+
+def move_stack(stack: Stack, phi: Floats, noise: Floats, q_scales: Floats) -> Stack:
+    """The hypotheses behind transition phi (n, n), each with its own multiple of noise (n, n): q_scales (M,)."""
+    return Stack(stack.means @ phi.T, phi @ stack.covs @ phi.T + q_scales[:, None, None] * noise)
+
+
+def update_stack(prior: Stack, residual: Floats, jacobian: Floats, noises: Floats) -> Update:
+    """Every hypothesis given residual (m,) = H x + v against the nominal, jacobian H (m, n), by its own R of noises (M, m, m).
+
+    Joseph form (11), written as in `core.condition`; likelihood (14). Raises LogError where an S is not positive definite.
+    """
+    own = residual - prior.means @ jacobian.T
+    seen = jacobian @ prior.covs
+    spread = seen @ jacobian.T + noises
+    solved = np.linalg.solve(spread, np.concatenate([seen, own[:, :, None]], axis=2))
+    signs, logs = np.linalg.slogdet(spread)
+    squares = (own * solved[:, :, -1]).sum(axis=1)
+    if (signs <= 0).any() or (squares < 0).any():
+        raise LogError(
+            "filter: the covariance of an innovation is not positive definite; are the scales of the bank plausible?"
+        )
+    gains = np.swapaxes(solved[:, :, :-1], 1, 2)
+    shared = gains @ seen
+    covs = prior.covs - shared - np.swapaxes(shared, 1, 2) + gains @ spread @ np.swapaxes(gains, 1, 2)
+    means = prior.means + (gains @ own[:, :, None])[:, :, 0]
+    return Update(Stack(means, (covs + np.swapaxes(covs, 1, 2)) / 2), -(logs + squares) / 2)
+
+
+class Bank:
+    """The estimator of a bank, with one kind of aiding. Keeps hypotheses, their adapters, the weights, and the record."""
+
+    def __init__(
+        self, aiding: Aiding, gate: EpochGate, model: ErrorModel, method: Method, weighting: Mmae, recorder: Recorder
+    ) -> None:
+        self._aiding = aiding
+        self._gate = gate
+        self._model = model
+        self._method = method
+        self._weighting = weighting
+        self._recorder = recorder
+        self._q_scales, self._r_scales = np.array(weighting.hypotheses()).T
+        self._labels = weighting.labels()
+        size = len(self._labels)
+        self._adapter_states: list[Any] = [method.adapter.init() for _ in range(size)]
+        self._leftovers: list[Leftover | None] = [None] * size
+        self._stack = Stack(np.zeros((size, model.size)), np.zeros((size, model.size, model.size)))
+        self._weights = weighting.start(0)
+        self._mixed: Floats | None = None
+        self._leader = ""
+        self._zero = np.zeros(model.size)
+
+    def propagate(
+        self, state: NavState, cov: Floats, steps: Steps, first: int, ends: np.ndarray, interval: float, keep: bool = False
+    ) -> Propagated:
+        """From state and the mixture's cov (n, n) before step `first` to the nodes behind ends (k,) steps, where covariances
+        are the mixture's."""
+        self._share(cov)
+        moved = self._model.propagate(state, cov, steps, first, ends, interval, keep=True)
+        beyond_told = self._weights.values @ self._q_scales - 1
+        phi, noise = np.eye(self._model.size), np.zeros_like(cov)
+        for node, (step, added) in enumerate(zip(moved.transitions, moved.noises, strict=True)):
+            phi = step @ phi
+            noise = symmetric(step @ noise @ step.T) + added
+            moved.covariances[node] += beyond_told * noise
+        self._stack = move_stack(self._stack, phi, noise, self._q_scales)
+        return moved
+
+    def _share(self, cov: Floats) -> None:
+        """What cov (n, n) holds beyond the mixture belongs to every hypothesis: the start, a clock jump, what a model sets."""
+        if cov is not self._mixed:
+            self._stack = self._stack._replace(covs=self._stack.covs + (cov - mix(self._stack, self._weights.values).cov))
+            self._mixed = cov
+
+    def update(self, epoch: int, state: NavState, cov: Floats, dtheta: Floats, dt: float) -> Updated:
+        """The epoch of that index, from state and the mixture's cov (n, n); dtheta (3,) [rad] and dt [s] are those of the step
+        before it."""
+        observed = self._aiding.observe(epoch, state, cov, dtheta, dt)
+        measurement, state, cov = observed
+        self._share(cov)
+        if measurement is None:
+            return Updated(state, cov, state, cov, RowStatus.PREDICTED, observed)
+        t_ns = int(self._aiding.t_ns[epoch])
+        prior, noises = self._adapt(t_ns, measurement)
+        mixture = Gaussian(self._zero, cov) if prior is self._stack else mix(prior, self._weights.values)
+        noise = _average(self._weights.values, noises)
+        innovation = self._method.rule.innovate(mixture, measurement)
+        verdict = self._gate.judge(measurement.kinds, innovation, noise)
+        if verdict.inflation > 1:
+            prior = prior._replace(covs=prior.covs * verdict.inflation)
+            mixture = mix(prior, self._weights.values)
+            innovation = self._method.rule.innovate(mixture, measurement)
+            tell_inflation(self._recorder, t_ns, self._aiding, verdict)
+            if not len(verdict.passed):
+                verdict = self._gate.judge(measurement.kinds, innovation, noise)
+        verdict.record(self._recorder, t_ns, measurement.kinds, innovation, noise)
+        if not len(verdict.passed):
+            self._leave(t_ns, innovation.labels, measurement, self._stack.means)
+            return Updated(state, cov, state, cov, RowStatus.REJECTED, observed)
+        passed = verdict.passed
+        part = measurement.residual[passed], measurement.jacobian[passed], noises[:, passed[:, None], passed]
+        updated = update_stack(prior, *part)
+        self._weigh(t_ns, updated.log_likelihood)
+        self._leave(t_ns, innovation.labels, measurement, updated.stack.means)
+        posterior = mix(updated.stack, self._weights.values)
+        self._stack = updated.stack._replace(means=updated.stack.means - posterior.mean)
+        moved = self._model.retract(state, posterior.mean)
+        self._mixed = symmetric(posterior.cov)
+        return Updated(moved, self._mixed, state, mixture.cov, RowStatus.UPDATED, observed)
+
+    def _adapt(self, t_ns: int, measurement: Measurement) -> tuple[Stack, Floats]:
+        """Prior and R (M, m, m) that the hypotheses' adapters choose; the stack itself where nothing can be chosen."""
+        rule, adapter = self._method.rule, self._method.adapter
+        if isinstance(adapter, Fixed):
+            return self._stack, measurement.noise * self._r_scales[:, None, None]
+        priors, noises = [], []
+        for j, prior in enumerate(map(Gaussian, *self._stack)):
+            told = measurement._replace(noise=measurement.noise * self._r_scales[j])
+            innovation = rule.innovate(prior, told)._replace(t_ns=t_ns, leftover=self._leftovers[j])
+            adapted, noise, self._adapter_states[j] = adapter.adapt(self._adapter_states[j], prior, innovation)
+            priors.append(adapted)
+            noises.append(noise)
+        return Stack(np.array([p.mean for p in priors]), np.array([p.cov for p in priors])), np.array(noises)
+
+    def _weigh(self, t_ns: int, log_likelihood: Floats) -> None:
+        self._weights = self._weighting.weigh(self._weights, t_ns, log_likelihood)
+        values = self._weights.values
+        self._recorder.weigh(t_ns, self._labels, values)
+        if self._weights.restarted:
+            self._recorder.tell(t_ns, "info", f"the bank doubts {self._leader or 'its leader'}: all weights are even again")
+            self._leader = ""
+        leader = self._labels[int(values.argmax())]
+        if leader != self._leader and values.max() > _LEADS:
+            self._recorder.tell(t_ns, "info", f"the bank follows {leader}, whose weight exceeds {_LEADS:g}")
+            self._leader = leader
+
+    def _leave(self, t_ns: int, labels: tuple[str, ...], measurement: Measurement, means: Floats) -> None:
+        """Keeps what the epoch's measurement was off from each hypothesis, whose errors have means (M, n)."""
+        residuals = measurement.residual - means @ measurement.jacobian.T
+        self._leftovers = [Leftover(t_ns, dict(zip(labels, row, strict=True))) for row in residuals.tolist()]
