@@ -1,4 +1,4 @@
-"""This program's own CSV layouts, recognised by their header: IMU, fixes, trajectories and solutions (docs/formats.md)."""
+"""This program's own CSV layouts, by their header: IMU, fixes, attitudes, trajectories and solutions (docs/formats.md)."""
 
 from collections.abc import Mapping
 
@@ -19,6 +19,8 @@ _VEL = ("vel_n_mps", "vel_e_mps", "vel_d_mps")
 _STD = ("std_n_m", "std_e_m", "std_d_m")
 _STD_VEL = ("std_vn_mps", "std_ve_mps", "std_vd_mps")
 _Q = ("q_nb_w", "q_nb_x", "q_nb_y", "q_nb_z")
+_Q_EARTH = ("q_eb_w", "q_eb_x", "q_eb_y", "q_eb_z")
+_STD_ATT = ("std_x_rad", "std_y_rad", "std_z_rad")
 _EULER = ("roll_deg", "pitch_deg", "yaw_deg")
 _GYRO = ("gyro_x_radps", "gyro_y_radps", "gyro_z_radps")
 _ACCEL = ("accel_x_mps2", "accel_y_mps2", "accel_z_mps2")
@@ -30,6 +32,7 @@ _LAYOUTS: dict[str, tuple[str, ...]] = {
     "navreplay/imu": ("t_gps_ns", *_GYRO, *_ACCEL),
     "navreplay/imu_mean": ("t_gps_ns", *_MEAN_GYRO, *_MEAN_ACCEL),
     "navreplay/trajectory": ("t_gps_ns", *_LLA, *_Q),
+    "navreplay/attitude": ("t_gps_ns", *_Q_EARTH),
     "navreplay/fix": ("t_gps_ns", *_LLA),
     "navreplay/range": ("t_gps_ns", "sat", "signal", "pseudorange_m", "sat_x_m"),
     "navreplay/solution": (*_WEEK, *_LLA, *_EULER),
@@ -43,7 +46,9 @@ _GROUPS: dict[str, tuple[tuple[str, ...], ...]] = {
     "vel_n": (_VEL,),
     "std_pos": (_STD,),
     "std_vel": (_STD_VEL,),
+    "std_att": (_STD_ATT,),
     "q_nb": (_Q,),
+    "q_eb": (_Q_EARTH,),
     "euler": (_EULER,),
 }
 _STATUS = {"": int(FixStatus.UNKNOWN), "nan": int(FixStatus.UNKNOWN)} | {status.name: int(status) for status in FixStatus}
@@ -83,7 +88,7 @@ def _build_table(selection: Selection) -> Table:
         out["lla"] = out["lla"] * [np.pi / 180, np.pi / 180, 1.0]
     if "euler" in out:
         out["q_nb"] = quat_from_euler(*np.radians(out.pop("euler")).T)
-    for key, cov in (("std_pos", "cov_pos"), ("std_vel", "cov_vel")):
+    for key, cov in (("std_pos", "cov_pos"), ("std_vel", "cov_vel"), ("std_att", "cov_att")):
         if key in out:
             out[cov] = diagonal_covariance(out.pop(key))
     if "status" in columns:

@@ -32,6 +32,7 @@ _GROUPS = {
     "vel_ecef": ("vel_ecef_x", "vel_ecef_y", "vel_ecef_z"),
     "std_pos": ("std_n", "std_e", "std_d"),
     "std_vel": ("std_vn", "std_ve", "std_vd"),
+    "std_att": ("std_att_x", "std_att_y", "std_att_z"),
     "euler": ("roll", "pitch", "yaw"),
     "q_nb": ("q_w", "q_x", "q_y", "q_z"),
 }
@@ -159,7 +160,9 @@ def _build_columns(selection: Selection, mapping: CsvMapping, timed: np.ndarray,
         out["vel_n"] = out.pop("vel_neu") * [1.0, 1.0, -1.0]
     if "euler" in out:
         out["q_nb"] = quat_from_euler(*(out.pop("euler") * angle).T)
-    for key, cov in (("std_pos", "cov_pos"), ("std_vel", "cov_vel")):
+    if "std_att" in out:
+        out["std_att"] = out["std_att"] * angle
+    for key, cov in (("std_pos", "cov_pos"), ("std_vel", "cov_vel"), ("std_att", "cov_att")):
         if key in out:
             out[cov] = diagonal_covariance(out.pop(key))
     if "status" in columns:

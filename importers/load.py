@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
+from importers.attitude_conversion import convert_attitude
 from importers.clock import leap_seconds
 from importers.fix_conversion import convert_fixes
 from importers.formats import open_log
 from importers.imu_conversion import convert_imu
 from importers.log import Log, Table
 from importers.range_conversion import convert_ranges
-from importers.reference_conversion import convert_attitude, convert_reference, reference_from_fixes
+from importers.reference_conversion import convert_reference, reference_from_fixes
 from importers.selection import Choice, choose_channels
 from importers.settings import InputSettings
 from importers.sources import Clock, Source, join_sources

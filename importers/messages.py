@@ -47,11 +47,18 @@ def stamp_column(table: Table) -> np.ndarray | None:
 
 
 def _imu(columns: Mapping[str, np.ndarray]) -> Rows:
+    has_orientation = "orientation" in columns and "orientation_covariance" in columns
+    cov = columns["orientation_covariance"].astype(np.float64).reshape(-1, 3, 3) if has_orientation else None
     return Rows(
         gyro=columns["angular_velocity"].astype(np.float64),
         accel=columns["linear_acceleration"].astype(np.float64),
         sensor_axes="flu",
         units_known=False,
+        q=scalar_first_from_last(columns["orientation"]) if has_orientation else None,
+        ros_attitude=True,
+        cov_att=cov,
+        # a first element of -1 says that there is none
+        q_missing=None if cov is None else cov[:, 0, 0] == -1,
     )
 
 
@@ -118,7 +125,9 @@ def _pose(prefix: str) -> Callable[[Mapping[str, np.ndarray]], Rows]:
     def rows(columns: Mapping[str, np.ndarray]) -> Rows:
         """Local positions and attitudes."""
         q = scalar_first_from_last(columns[prefix + "orientation"])
-        return Rows(local=columns[prefix + "position"].astype(np.float64), q=q, ros_attitude=True)
+        cov = columns.get("pose.covariance")
+        cov_att = None if cov is None else cov.astype(np.float64).reshape(-1, 6, 6)[:, 3:, 3:]
+        return Rows(local=columns[prefix + "position"].astype(np.float64), q=q, ros_attitude=True, cov_att=cov_att)
 
     return rows
 
@@ -149,7 +158,12 @@ def _text(columns: Mapping[str, np.ndarray], units_known: bool = True, means: bo
         cov_vel=columns.get("cov_vel"),
         status=columns.get("status"),
         q=columns.get("q_nb"),
+        cov_att=columns.get("cov_att"),
     )
+
+
+def _earth_attitude(columns: Mapping[str, np.ndarray]) -> Rows:
+    return Rows(q=columns["q_eb"], q_frame="earth", cov_att=columns.get("cov_att"))
 
 
 def _text_means(columns: Mapping[str, np.ndarray]) -> Rows:
@@ -166,7 +180,7 @@ _POSE = ("reference", "attitude")
 _MSL_NOTE = "heights of the fixes are taken as ellipsoidal, as NavSatFix defines them; some drivers give mean sea level"
 
 KINDS: dict[str, Kind] = {
-    "sensor_msgs/Imu": Kind(("imu",), _imu),
+    "sensor_msgs/Imu": Kind(("imu", "attitude"), _imu),
     "sensor_msgs/NavSatFix": Kind(_FIX, _nav_sat_fix, _MSL_NOTE),
     "sensor_msgs/TimeReference": Kind(("time",), _no_rows),
     "gps_common/GPSFix": Kind(_FIX, _gps_fix),
@@ -177,6 +191,7 @@ KINDS: dict[str, Kind] = {
     "geometry_msgs/TwistWithCovarianceStamped": Kind(("velocity",), _twist("twist.twist.")),
     "geometry_msgs/QuaternionStamped": Kind(("attitude",), _quaternion, automatic=False),
     "geometry_msgs/PoseStamped": Kind(_POSE, _pose("pose."), automatic=False),
+    "geometry_msgs/PoseWithCovarianceStamped": Kind(_POSE, _pose("pose.pose."), automatic=False),
     "nav_msgs/Odometry": Kind(_POSE, _pose("pose.pose."), automatic=False),
     "foxglove.PoseInFrame": Kind(_POSE, _pose("pose."), automatic=False),
     "foxglove_msgs/PoseInFrame": Kind(_POSE, _pose("pose."), automatic=False),
@@ -185,6 +200,7 @@ KINDS: dict[str, Kind] = {
     "navreplay/imu": Kind(("imu",), _text),
     "navreplay/imu_mean": Kind(("imu",), _text_means),
     "navreplay/fix": Kind(_FIX, _text),
+    "navreplay/attitude": Kind(("attitude",), _earth_attitude),
     "navreplay/trajectory": Kind(("reference",), _text),
     "navreplay/solution": Kind(("reference",), _text),
     "rtklib/pos": Kind(_FIX, _text),

@@ -4,6 +4,7 @@ from typing import Literal
 
 import numpy as np
 
+from importers.attitude_findings import check_attitudes
 from importers.findings import Finding
 from importers.motion_findings import check_motion
 from importers.range_findings import check_ranges
@@ -33,10 +34,18 @@ def preflight(timeline: Timeline) -> tuple[Finding, ...]:
         hint = "Add the file that holds the IMU, or name its channel with input.imu.channel."
         findings.append(Finding(level, "no-imu", f"There is no IMU in the log; it holds {seen}.", hint))
     else:
-        findings += [*_check_gravity(imu, fixes), *_check_gyro(imu), *_check_rate(imu)]
+        in_space = timeline.attitude is not None and timeline.attitude.frame == "earth"
+        # a body that flies by the stars may stand on its tail or fall freely
+        findings += [*([] if in_space else _check_gravity(imu, fixes)), *_check_gyro(imu), *_check_rate(imu)]
     if timeline.ranges is not None:
         findings += check_ranges(timeline.ranges, timeline.provenance.channels)
-    if fixes is None and timeline.ranges is None:
+    if imu is not None and timeline.attitude is not None:
+        findings += check_attitudes(timeline.attitude, imu)
+    if fixes is None and timeline.ranges is None and timeline.attitude is not None:
+        text = "There are no GNSS fixes in the log: attitudes alone leave position and velocity to the inertial sensors."
+        hint = "Set alignment.position_deg_m and alignment.velocity_mps; expect the position to drift."
+        findings.append(Finding("info", "no-gnss", text, hint))
+    elif fixes is None and timeline.ranges is None:
         hint = "Add the file that holds the fixes, or name their channel with input.fix.channel."
         findings.append(Finding("error", "no-gnss", f"There are no GNSS fixes in the log; it holds {seen}.", hint))
     elif fixes is not None:

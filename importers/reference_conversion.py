@@ -1,20 +1,20 @@
-"""Rows of a reference as a trajectory, and rows of an attitude sensor as a series."""
+"""Rows of a reference as a trajectory."""
 
 import numpy as np
 
+from importers.attitude_conversion import unit_quaternions
 from importers.fix_conversion import clean_covariance, screen_positions
 from importers.rows import Rows, drop_absurd
 from importers.screening import Screening
-from importers.settings import AttitudeInput, ReferenceInput
+from importers.settings import ReferenceInput
 from importers.sources import Joined, account
 from importers.velocity_frame import turn_velocities
 from navreplay.earth import ecef_from_lla, lla_from_ecef, matrix_en
 from navreplay.rotation import frd_ned_from_flu_enu
-from navreplay.timeline import AttitudeSeries, ChannelUse, FixStatus, Floats, GnssFixSeries, LogError, Times, Trajectory
+from navreplay.timeline import ChannelUse, FixStatus, Floats, GnssFixSeries, LogError, Times, Trajectory
 
-__all__ = ["convert_attitude", "convert_reference", "reference_from_fixes"]
+__all__ = ["convert_reference", "reference_from_fixes"]
 
-_NEAR_UNIT = 0.1
 _NED_OF_ENU = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 
 
@@ -53,28 +53,10 @@ def reference_from_fixes(fixes: GnssFixSeries, settings: ReferenceInput) -> Traj
     return Trajectory(fixes.t_ns[chosen], fixes.lla[chosen], fixes.vel_n[chosen], q_nb, fixes.cov_pos[chosen])
 
 
-def convert_attitude(joined: Joined, settings: AttitudeInput) -> tuple[AttitudeSeries, tuple[ChannelUse, ...], tuple[str, ...]]:
-    """The series, its accounting, and what was assumed. Raises LogError where no row is usable."""
-    if joined.rows.q is None:
-        raise LogError(f"{joined.name}: holds no attitude")
-    q = _attitude(joined.rows, settings.convention)
-    screening = Screening(joined.name, len(q))
-    screening.reject(~np.isfinite(q).all(axis=1), "not finite or not a quaternion")
-    order = screening.order(joined.t_ns)
-    if len(order) == 0:
-        raise LogError(f"{joined.name}: none of its {len(q)} attitudes is usable: {screening.rejected(slice(None))}")
-    unknown = np.full((len(order), 3, 3), np.nan)
-    series = AttitudeSeries(joined.t_ns[order], q[order], unknown, heading_only=settings.heading_only)
-    return series, account(joined, screening), (*joined.notes, *screening.notes)
-
-
 def _attitude(rows: Rows, convention: str) -> Floats:
     """q_nb (n, 4) of unit length, NaN where the log has none."""
     assert rows.q is not None
-    q = drop_absurd(rows.q)
-    norm = np.linalg.norm(q, axis=1, keepdims=True)
-    usable = np.abs(norm - 1) < _NEAR_UNIT
-    q = np.where(usable, q / np.where(usable, norm, 1.0), np.nan)
+    q = unit_quaternions(rows.q)
     return frd_ned_from_flu_enu(q) if rows.ros_attitude and convention == "ros" else q
 
 

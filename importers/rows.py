@@ -26,8 +26,9 @@ class Rows:
     gyro, accel: (n, 3) in the sensor's axes and units; sensor_axes: where those axes point unless told otherwise;
     units_known: they are rad/s and m/s^2 for certain; means: each sample is the mean over its interval. lla: (n, 3) [rad,
     rad, m], or local: (n, 3) east, north, up of a local origin [m]. vel: (n, 3) [m/s] in vel_frame. cov_pos: (n, 3, 3) NED.
-    cov_vel: (n, 3, 3) in vel_frame. status: (n,) int8 of FixStatus or NO_FIX. q: (n, 4) scalar first, body to navigation;
-    ros_attitude: of an FLU body in ENU instead of FRD in NED.
+    cov_vel: (n, 3, 3) in vel_frame. status: (n,) int8 of FixStatus or NO_FIX. q: (n, 4) scalar first, body to navigation
+    or, where the type says so, q_frame; ros_attitude: of an FLU body in ENU instead of FRD in NED. cov_att: (n, 3, 3) of the
+    rotation about the axes that q leads to [rad^2]. q_missing: (n,) rows that say that they have no orientation.
     """
 
     gyro: Floats | None = None
@@ -44,6 +45,9 @@ class Rows:
     status: NDArray[np.int8] | None = None
     q: Floats | None = None
     ros_attitude: bool = False
+    q_frame: Literal["earth"] | None = None
+    cov_att: Floats | None = None
+    q_missing: NDArray[np.bool_] | None = None
 
 
 def drop_absurd(values: Floats) -> Floats:

@@ -30,6 +30,7 @@ Stamp = Literal["header", "log"]
 StatusName = Literal["unknown", "single", "differential", "float", "fixed", "dead_reckoning", "none"]
 Column = str | Annotated[int, Field(ge=1)]
 Vector = tuple[float, float, float]
+Positive = Annotated[float, Field(gt=0)]
 System = Literal["G", "R", "E", "C", "J"]
 Signal = Annotated[str, Field(pattern="^[1-9][A-Z]$")]
 
@@ -66,6 +67,9 @@ Quantity = Literal[
     "q_x",
     "q_y",
     "q_z",
+    "std_att_x",
+    "std_att_y",
+    "std_att_z",
     "status",
     "sat",
     "signal",
@@ -88,7 +92,8 @@ Quantity = Literal[
     "ionosphere_m",
     "troposphere_m",
 ]
-"""What a column of a text file can hold. ``yaw`` is clockwise from north; ``q_*`` is the quaternion body (FRD) to NED. Of
+"""What a column of a text file can hold. ``yaw`` is clockwise from north; ``q_*`` is the quaternion body (FRD) to NED, or
+to the frame that ``input.attitude`` names, ``std_att_*`` the standard deviations about the axes of that frame. Of
 ranges, ``sat_clock_*`` and ``relativity_m`` are added to the pseudorange, ``group_delay_m``, ``ionosphere_m`` and
 ``troposphere_m`` (delays) are subtracted from it."""
 
@@ -152,13 +157,23 @@ class FixInput(_Settings):
 
 
 class AttitudeInput(_Settings):
-    """Another attitude sensor, used only where channel names it. convention: ``ros`` is a forward-left-up body in
-    east-north-up, ``ned`` a forward-right-down body in north-east-down."""
+    """Another attitude sensor: dual antenna, AHRS, star tracker. Of messages only used where channel names it.
+
+    frame: what the attitude is against; ``auto`` is NED unless the layout says Earth-fixed; ``inertial`` are axes through the
+    Earth's that do not turn with it, of date (no precession or nutation is applied), ut1_utc_s UT1 - UTC. direction: of the
+    quaternion or angles. convention, of ROS messages: ``ros`` is a forward-left-up body, in east-north-up where the frame is
+    navigation; ``ned`` a forward-right-down body, in north-east-down. boresight_deg: roll, pitch, yaw of the sensor's axes
+    against the body. sigma_arcsec: about the sensor's x, y and z, in place of what the log tells."""
 
     channel: str | None = None
     time_base: TimeBase = "auto"
     time_offset_s: float = 0.0
+    frame: Literal["auto", "navigation", "earth", "inertial"] = "auto"
+    direction: Literal["body_to_frame", "frame_to_body"] = "body_to_frame"
     convention: Literal["ros", "ned"] = "ros"
+    boresight_deg: Vector = (0.0, 0.0, 0.0)
+    sigma_arcsec: tuple[Positive, Positive, Positive] | None = None
+    ut1_utc_s: Annotated[float, Field(ge=-1, le=1)] = 0.0
     heading_only: bool = False
 
 

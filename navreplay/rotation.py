@@ -16,6 +16,7 @@ __all__ = [
     "enu_from_ned",
     "euler_from_quat",
     "flu_from_frd",
+    "frd_from_flu_body",
     "frd_ned_from_flu_enu",
     "matrix_from_euler",
     "matrix_from_quat",
@@ -176,6 +177,11 @@ def enu_from_ned(vector: Floats) -> Floats:
 def frd_ned_from_flu_enu(q: Floats) -> Floats:
     """q_nb (..., 4), FRD body in NED, from the quaternion of an FLU body in ENU (as ROS REP 103 has it); its own inverse."""
     return quat_multiply(quat_multiply(_NED_FROM_ENU, q), _FLU_FROM_FRD)
+
+
+def frd_from_flu_body(q: Floats) -> Floats:
+    """Quaternion (..., 4) to any axes of an FRD body, from that of the FLU body; its own inverse but for the sign."""
+    return quat_multiply(q, np.broadcast_to(_FLU_FROM_FRD, np.shape(q)))
 
 
 # Written once for floats and arrays: single quaternions, as filters have them at epochs, go through plain floats, which is

@@ -16,6 +16,7 @@ __all__ = [
     "LEAP_SECONDS",
     "WEEK_S",
     "LeapSeconds",
+    "earth_rotation_angle",
     "gps_from_tai",
     "gps_from_utc",
     "gps_from_week_tow",
@@ -29,6 +30,8 @@ WEEK_S = 604_800
 _S = 1_000_000_000
 _TAI_MINUS_GPS_S = 19
 _NTP_MINUS_UNIX_S = 2_208_988_800
+_J2000_UNIX_S = 946_728_000
+_DAY_S = 86_400
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,3 +134,15 @@ def week_tow_from_gps(t_ns: Times) -> tuple[np.ndarray, np.ndarray]:
     t_ns = np.asarray(t_ns, dtype=np.int64)
     week = t_ns // (WEEK_S * _S)
     return week, (t_ns - week * WEEK_S * _S) / 1e9
+
+
+def earth_rotation_angle(t_ns: Times, ut1_utc: float = 0.0) -> np.ndarray:
+    """Angle (n,) [rad] by which the Earth has turned from the celestial to the terrestrial origin of longitude at t_ns (n,).
+
+    ut1_utc [s]: UT1 - UTC, which the IERS publishes; a second of it is 15 arcseconds. Source: IERS Conventions (2010), (5.15).
+    """
+    since_j2000_ns = utc_from_gps(t_ns) - _J2000_UNIX_S * _S + round(ut1_utc * 1e9)
+    whole, rest_ns = np.divmod(since_j2000_ns, _DAY_S * _S)
+    fraction = rest_ns / (_DAY_S * 1e9)
+    turns = 0.7790572732640 + 0.00273781191135448 * (whole + fraction) + fraction
+    return np.asarray(2 * np.pi * (turns % 1))

@@ -10,10 +10,11 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from navreplay.options import GRADES, AlignmentOptions, ConsiderOptions, GapOptions, GateOptions, ImuNoise
+from navreplay.options import GRADES, AlignmentOptions, AttitudeOptions, ConsiderOptions, GapOptions, GateOptions, ImuNoise
 
 __all__ = [
     "AlignmentSection",
+    "AttitudeSection",
     "ConsiderSection",
     "FilterSection",
     "GapSection",
@@ -104,6 +105,14 @@ class AlignmentSection(Section):
     )
     given_deg: Vector | None = Field(None, description="roll, pitch, yaw of the body in NED [deg]")
     given_std_deg: tuple[Positive, Positive, Positive] = Field((1.0, 1.0, 3.0), description="their standard deviations [deg]")
+    position_deg_m: Vector | None = Field(
+        None, description="start where the log tells no position: latitude [deg], longitude [deg], height [m]"
+    )
+    position_std_m: tuple[Positive, Positive, Positive] = Field(
+        (10.0, 10.0, 10.0), description="standard deviations of that position: north, east, down [m]"
+    )
+    velocity_mps: Vector = Field((0.0, 0.0, 0.0), description="velocity at that start: north, east, down [m/s]")
+    velocity_std_mps: tuple[Positive, Positive, Positive] = Field((0.1, 0.1, 0.1), description="its standard deviations [m/s]")
     static_window_s: Positive = Field(60.0, description="longest static stretch used for levelling [s]")
     min_speed_mps: Positive = Field(2.0, description="GNSS speed from which course counts as heading [m/s]")
     course_std_deg: Positive = Field(3.0, description="least standard deviation of a heading from course [deg]")
@@ -122,6 +131,10 @@ class AlignmentSection(Section):
             method=self.method,
             given=None if self.given_deg is None else _radians(self.given_deg),
             given_std=_radians((roll, pitch, yaw)),
+            position=None if self.position_deg_m is None else (*_radians(self.position_deg_m)[:2], self.position_deg_m[2]),
+            position_std=self.position_std_m,
+            velocity=self.velocity_mps,
+            velocity_std=self.velocity_std_mps,
             static_window=self.static_window_s,
             min_speed=self.min_speed_mps,
             course_std=self.course_std_deg * _DEG,
@@ -149,6 +162,18 @@ class GateSection(Section):
         return GateOptions(self.probability, self.reset_after)
 
 
+class AttitudeSection(Section):
+    """Measured attitudes in the filter."""
+
+    use: bool = Field(True, description="let measured attitudes aid the filter; false: they serve alignment alone")
+    default_std_deg: Positive = Field(1.0, description="standard deviation where the log tells none [deg]")
+    std_floor_arcsec: Positive = Field(0.1, description="least standard deviation believed [arcsec]")
+
+    def options(self) -> AttitudeOptions:
+        """The same in radians."""
+        return AttitudeOptions(self.use, self.default_std_deg * _DEG, self.std_floor_arcsec * _DEG / 3600)
+
+
 class GapSection(Section):
     """What to do where IMU samples are missing."""
 
@@ -164,8 +189,9 @@ class FilterSection(Section):
     """The method (``navreplay filters`` lists them) and how it runs."""
 
     name: str = Field("fixed", description="name of the method")
-    use: Literal["auto", "fixes", "ranges"] = Field(
-        "auto", description="what aids the filter: fixes or ranges; auto: ranges where the log has them"
+    use: Literal["auto", "fixes", "ranges", "attitudes"] = Field(
+        "auto",
+        description="what aids the filter beside attitudes: fixes, ranges (auto: where the log has them) or nothing else",
     )
     parameters: Mapping[str, object] = Field(default_factory=dict, description="parameters of the method, by name")
     covariance_interval_s: Positive = Field(0.05, description="longest step of the covariance propagation [s]")

@@ -21,6 +21,7 @@ from navreplay.timeline import LogError
 from pipelines.range_sections import MotionSection, RangeSection
 from pipelines.sections import (
     AlignmentSection,
+    AttitudeSection,
     ConsiderSection,
     FilterSection,
     GapSection,
@@ -48,6 +49,7 @@ class Config(Section):
     filter: FilterSection = FilterSection()
     consider: ConsiderSection = ConsiderSection()
     gnss: GnssSection = GnssSection()
+    attitude: AttitudeSection = AttitudeSection()
     range: RangeSection = RangeSection()
     motion: MotionSection = MotionSection()
     output: OutputSection = OutputSection()
@@ -73,6 +75,7 @@ def filter_options(config: Config) -> FilterOptions:
         default_position_std=config.gnss.default_position_std_m.by_status(),
         default_velocity_std=config.gnss.default_velocity_std_mps,
         use=config.filter.use,
+        attitude=config.attitude.options(),
         ranges=config.range.options(),
         motion=config.motion.options(),
         consider=config.consider.options(),

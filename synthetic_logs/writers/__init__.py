@@ -13,7 +13,7 @@ FORMATS: dict[str, str] = {
     ".bag": "ROS 1 bag, ranges as gnss_comm messages",
     ".db3": "ROS 2 bag, the bare SQLite file, ranges as gnss_comm messages",
     "": "ROS 2 bag, a directory with metadata.yaml and the SQLite file",
-    ".csv": "NAME.imu.csv, NAME.fix.csv and NAME.ranges.csv in our own columns",
+    ".csv": "NAME.imu.csv, NAME.fix.csv, NAME.attitude.csv and NAME.ranges.csv in our own columns",
     ".obs": "ranges as RINEX 3 NAME.obs and NAME.nav, with NAME.imu.csv",
 }
 """What `write` can produce, by extension of the path."""
@@ -58,8 +58,8 @@ def _log_paths(log: SyntheticLog, path: Path) -> tuple[Path, ...]:
         return path, path.with_suffix(".nav"), path.with_suffix(".imu.csv")
     if path.suffix != ".csv":
         return (path,)
-    kinds = [".imu.csv", *([".fix.csv"] if log.fixes is not None else []), *([".ranges.csv"] if log.ranges is not None else [])]
-    return tuple(path.with_suffix(kind) for kind in kinds)
+    held = {"imu": log.imu, "fix": log.fixes, "attitude": log.attitude, "ranges": log.ranges}
+    return tuple(path.with_suffix(f".{kind}.csv") for kind, series in held.items() if series is not None)
 
 
 def _writer(path: Path) -> Callable[[SyntheticLog, Path], None]:

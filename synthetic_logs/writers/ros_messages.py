@@ -1,12 +1,13 @@
 """Series of a log as serialised ROS messages, packed by the column.
 
-sensor_msgs/Imu on /imu/data, sensor_msgs/NavSatFix on /gnss/fix, geometry_msgs/TwistStamped (velocity in ENU) on /gnss/vel.
+sensor_msgs/Imu on /imu/data, sensor_msgs/NavSatFix on /gnss/fix, geometry_msgs/TwistStamped (velocity in ENU) on /gnss/vel,
+geometry_msgs/QuaternionStamped (body to Earth-fixed axes) on /stars/attitude.
 ROS conventions (REP 103, REP 145): UTC stamps, forward-left-up body axes, east-north-up covariances, ellipsoidal altitude; a
-first covariance element of -1 says that there is no orientation. What ROS cannot hold: TwistStamped has no covariance, and
-NavSatFix.status knows only 0 (fix: SINGLE, and UNKNOWN, DEAD_RECKONING for want of a better), 1 (satellite-based augmentation:
-DIFFERENTIAL) and 2 (ground-based augmentation: FLOAT, FIXED).
+first covariance element of -1 says that there is no orientation. What ROS cannot hold: TwistStamped and QuaternionStamped have
+no covariance, and NavSatFix.status knows only 0 (fix: SINGLE, and UNKNOWN, DEAD_RECKONING for want of a better), 1
+(satellite-based augmentation: DIFFERENTIAL) and 2 (ground-based augmentation: FLOAT, FIXED).
 
-All three messages have a fixed layout as long as frame_id does not change, so that a structured array is the serialised
+All these messages have a fixed layout as long as frame_id does not change, so that a structured array is the serialised
 form: CDR (OMG DDSI-RTPS, 10.2) aligns every number to its size behind a header of four bytes, ROS 1 packs them.
 """
 
@@ -16,9 +17,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from navreplay.rotation import enu_from_ned, flu_from_frd
+from navreplay.rotation import enu_from_ned, flu_from_frd, frd_from_flu_body, scalar_last_from_first
 from navreplay.time_scales import utc_from_gps
-from navreplay.timeline import FixStatus, GnssFixSeries, ImuSeries, Times
+from navreplay.timeline import AttitudeSeries, FixStatus, GnssFixSeries, ImuSeries, Times
 from synthetic_logs.simulation import SyntheticLog
 
 __all__ = ["Encoding", "Messages", "in_time_order", "messages_of"]
@@ -49,12 +50,14 @@ class Messages:
 
 
 def messages_of(log: SyntheticLog, encoding: Encoding) -> tuple[Messages, ...]:
-    """All topics of a log but for its ranges; without /gnss/fix and /gnss/vel where the log has no fixes or no velocity."""
+    """All topics of a log but for its ranges; without those of fixes, velocity or attitudes where it has none."""
     topics = [_imu(log.imu, encoding)]
     if log.fixes is not None:
         topics.append(_fixes(log.fixes, encoding))
         if log.fixes.has_velocity.any():
             topics.append(_velocities(log.fixes, encoding))
+    if log.attitude is not None:
+        topics.append(_attitudes(log.attitude, encoding))
     return tuple(topics)
 
 
@@ -107,6 +110,11 @@ def _velocities(fixes: GnssFixSeries, encoding: Encoding) -> Messages:
     linear = enu_from_ned(fixes.vel_n[known])
     fields: dict[str, np.ndarray] = {"linear": linear, "angular": np.zeros_like(linear)}
     return _messages("/gnss/vel", "geometry_msgs/msg/TwistStamped", fixes.t_ns[known], "enu", fields, encoding)
+
+
+def _attitudes(attitude: AttitudeSeries, encoding: Encoding) -> Messages:
+    fields: dict[str, np.ndarray] = {"quaternion": scalar_last_from_first(frd_from_flu_body(attitude.q))}
+    return _messages("/stars/attitude", "geometry_msgs/msg/QuaternionStamped", attitude.t_ns, "ecef", fields, encoding)
 
 
 def _messages(

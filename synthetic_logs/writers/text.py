@@ -10,17 +10,19 @@ import numpy as np
 import pyarrow as pa
 from pyarrow import csv
 
-from navreplay.timeline import FixStatus, Floats, GnssFixSeries, ImuSeries, RangeSeries
+from navreplay.timeline import AttitudeSeries, FixStatus, Floats, GnssFixSeries, ImuSeries, RangeSeries
 from synthetic_logs.simulation import SyntheticLog
 
 __all__ = ["write_csv", "write_imu", "write_truth"]
 
 
 def write_csv(log: SyntheticLog, path: Path) -> None:
-    """NAME.imu.csv, and NAME.fix.csv and NAME.ranges.csv where the log has fixes and ranges, for the path NAME.csv."""
+    """NAME.imu.csv, and NAME.fix.csv, NAME.attitude.csv and NAME.ranges.csv where the log has these, for the path NAME.csv."""
     write_imu(log.imu, path.with_suffix(".imu.csv"))
     if log.fixes is not None:
         _write_fixes(log.fixes, path.with_suffix(".fix.csv"))
+    if log.attitude is not None:
+        _write_attitudes(log.attitude, path.with_suffix(".attitude.csv"))
     if log.ranges is not None:
         _write_ranges(log.ranges, path.with_suffix(".ranges.csv"))
 
@@ -43,6 +45,15 @@ def _write_fixes(fixes: GnssFixSeries, path: Path) -> None:
         **_columns(["std_n_m", "std_e_m", "std_d_m"], _std(fixes.cov_pos)),
         **_columns(["std_vn_mps", "std_ve_mps", "std_vd_mps"], _std(fixes.cov_vel)),
         "status": np.array([FixStatus(status).name for status in fixes.status.tolist()]),
+    }
+    _write_table(path, columns)
+
+
+def _write_attitudes(attitude: AttitudeSeries, path: Path) -> None:
+    columns = {
+        "t_gps_ns": attitude.t_ns,
+        **_columns([f"q_eb_{part}" for part in "wxyz"], attitude.q),
+        **_columns([f"std_{axis}_rad" for axis in "xyz"], _std(attitude.cov)),
     }
     _write_table(path, columns)
 
