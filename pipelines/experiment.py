@@ -17,6 +17,7 @@ from navreplay.metrics import evaluate
 from navreplay.options import FilterOptions
 from navreplay.solution import Solution
 from navreplay.timeline import Floats, LogError, Times
+from pipelines.perturbed import Perturbation, Perturbed
 from pipelines.restarted import Restarted
 from pipelines.told_noise import Knowledge, NoiseRatio, StartErrors, compare_noise, displace_start, tell
 from synthetic_logs.simulation import Journey, Scenario, SyntheticLog, simulate, truth_at
@@ -42,13 +43,15 @@ QUANTITIES = ("position", "velocity", "attitude")
 @dataclass(frozen=True, slots=True)
 class Arm:
     """One line of an experiment's tables. method: a preset, with parameters. told: what of the true noise it knows. restarts:
-    times in seconds from the start of the log at which its adapter forgets all it has seen."""
+    times in seconds from the start of the log at which its adapter forgets all it has seen. options: in place of the
+    experiment's."""
 
     label: str
     method: str
     parameters: Mapping[str, object] = field(default_factory=dict)
     told: Knowledge = "log"
     restarts: tuple[float, ...] = ()
+    options: FilterOptions | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +112,8 @@ class NoiseClaim:
 class Experiment:
     """Everything that decides an experiment but the seeds. description is one line, paper names the source. arms: the first is
     the reference of paired differences. drawn: labels of up to six arms that the plots show. start: errors that every filter
-    starts with, beside those of the alignment in options; None: those of the first fix. notes: readings, choices."""
+    starts with, beside those of the alignment in options; None: those of the first fix. perturbations: of what arms predict
+    that are not told the model. notes: readings, choices."""
 
     name: str
     description: str
@@ -124,6 +128,7 @@ class Experiment:
     noise_claims: tuple[NoiseClaim, ...] = ()
     published_noise: tuple[PublishedNoise, ...] = ()
     start: StartErrors | None = None
+    perturbations: tuple[Perturbation, ...] = ()
     notes: tuple[str, ...] = ()
 
 
@@ -192,12 +197,12 @@ def run_seed(experiment: Experiment, seed: int) -> Outcome:
     t_ns = _judged_epochs(experiment.scenario.journey)
     arms, failures, seconds = {}, {}, {}
     for arm in experiment.arms:
-        timeline, method = tell(log, arm.told), _build(arm, log)
+        timeline, method = tell(log, arm.told), _build(arm, experiment, log)
         if experiment.start is not None:
             timeline = displace_start(timeline, log, experiment.start)
         begin = process_time()
         try:
-            solution = run_filter(timeline, method, experiment.options)
+            solution = run_filter(timeline, method, arm.options or experiment.options)
         except LogError as error:
             failures[arm.label] = str(error)
             continue
@@ -206,12 +211,14 @@ def run_seed(experiment: Experiment, seed: int) -> Outcome:
     return Outcome(seed, (t_ns - log.scenario.journey.start_ns) / 1e9, arms, failures, seconds)
 
 
-def _build(arm: Arm, log: SyntheticLog) -> Method:
-    method = build_method(arm.method, arm.parameters)
-    if not arm.restarts:
-        return method
-    start_ns = log.scenario.journey.start_ns
-    return replace(method, adapter=Restarted(method.adapter, tuple(start_ns + round(t_s * 1e9) for t_s in arm.restarts)))
+def _build(arm: Arm, experiment: Experiment, log: SyntheticLog) -> Method:
+    method, start_ns = build_method(arm.method, arm.parameters), log.scenario.journey.start_ns
+    if arm.restarts:
+        times = tuple(start_ns + round(t_s * 1e9) for t_s in arm.restarts)
+        method = replace(method, adapter=Restarted(method.adapter, times))
+    if experiment.perturbations and arm.told != "model":
+        method = replace(method, rule=Perturbed(experiment.perturbations, start_ns))
+    return method
 
 
 def _judged_epochs(journey: Journey) -> Times:

@@ -90,7 +90,8 @@ def _tell_fixes(
         outlier = (errors.outlier * settings.outlier_size**2 / 3)[:, None, None] * np.eye(3)
         coloured = steady * _whitened(settings.correlation_time, interval)
         cov_pos, cov_vel = (cov_pos - steady) * drawn + coloured + outlier, cov_vel * drawn
-    return replace(fixes, cov_pos=cov_pos, cov_vel=cov_vel)
+    lla, vel_n = move_lla(fixes.lla, -errors.bias_pos), fixes.vel_n - errors.bias_vel
+    return replace(fixes, lla=lla, vel_n=vel_n, cov_pos=cov_pos, cov_vel=cov_vel)
 
 
 def _tell_ranges(

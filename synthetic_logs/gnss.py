@@ -30,11 +30,12 @@ class GnssErrors:
     position_std [m], velocity_std [m/s] (None: the log has no velocity): white noise. correlated_std [m] with
     correlation_time [s]: first-order Gauss-Markov position error, steady from the first epoch. mixture_probability: share of
     epochs whose white noise has mixture_scale times its standard deviation, one label for all components. outlier_probability:
-    share of epochs with a position error of outlier_size [m] in a random direction on top. outages: windows (start, end)
+    share of epochs with a position error of outlier_size [m] in a random direction on top. position_bias_std [m] and
+    velocity_bias_std [m/s]: of errors that are drawn once and stay for the whole log. outages: windows (start, end)
     without fixes. noise_windows: (start, end, scale) of the white noise in the data.
 
     The covariance told in the log is that of told_position_std and told_velocity_std (None: those of white and correlated
-    noise together), times told_windows (start, end, scale); noise_windows, mixture and outliers are never told.
+    noise together), times told_windows (start, end, scale); noise_windows, mixture, outliers and biases are never told.
     """
 
     position_std: Triple
@@ -45,6 +46,8 @@ class GnssErrors:
     mixture_scale: float = 1.0
     outlier_probability: float = 0.0
     outlier_size: float = 0.0
+    position_bias_std: Triple = (0.0, 0.0, 0.0)
+    velocity_bias_std: Triple = (0.0, 0.0, 0.0)
     outages: tuple[tuple[float, float], ...] = ()
     noise_windows: tuple[ScaledWindow, ...] = ()
     told_position_std: Triple | None = None
@@ -68,7 +71,7 @@ class FixErrors:
     antenna: the truth. position (n, 3) NED [m] and velocity (n, 3) NED [m/s], zero where the log has none: the errors.
     correlated (n, 3) NED [m]: the part of position that is correlated in time. wide, outlier (n,): labels of the mixture's wide
     component and of outliers. cov_pos (n, 3, 3), cov_vel (n, 3, 3): true second moments, windows and mixture included, outliers
-    not.
+    and biases not. bias_pos (3,) NED [m] and bias_vel (3,) NED [m/s]: the part of position and velocity that stays.
     """
 
     antenna: AntennaPath
@@ -79,6 +82,8 @@ class FixErrors:
     outlier: NDArray[np.bool_]
     cov_pos: Floats
     cov_vel: Floats
+    bias_pos: Floats
+    bias_vel: Floats
 
 
 def antenna_path(motion: Kinematics, lever_b: Floats) -> AntennaPath:
@@ -116,8 +121,12 @@ def _draw_errors(antenna: AntennaPath, t_s: Floats, interval: float, errors: Gns
     position = drawn_scale * errors.position_std * generator_for(seed, "white position").standard_normal((n, 3)) + correlated
     position += np.where(outlier, errors.outlier_size, 0.0)[:, None] * direction
     velocity = drawn_scale * velocity_std * generator_for(seed, "white velocity").standard_normal((n, 3))
+    bias_pos = errors.position_bias_std * generator_for(seed, "position bias").standard_normal(3)
+    bias_vel = errors.velocity_bias_std * generator_for(seed, "velocity bias").standard_normal(3)
     cov_pos = _diagonal(moment_scale * errors.position_std) + _diagonal(np.tile(errors.correlated_std, (n, 1)))
-    return FixErrors(antenna, position, velocity, correlated, wide, outlier, cov_pos, _diagonal(moment_scale * velocity_std))
+    cov_vel = _diagonal(moment_scale * velocity_std)
+    position, velocity = position + bias_pos, velocity + bias_vel
+    return FixErrors(antenna, position, velocity, correlated, wide, outlier, cov_pos, cov_vel, bias_pos, bias_vel)
 
 
 def measure_fixes(
@@ -156,4 +165,6 @@ def _rows(drawn: FixErrors, kept: NDArray[np.bool_]) -> FixErrors:
         drawn.outlier[kept],
         drawn.cov_pos[kept],
         drawn.cov_vel[kept],
+        drawn.bias_pos,
+        drawn.bias_vel,
     )

@@ -110,6 +110,13 @@ _SPIRAL = Motion(
     coordinated=True,
 )
 
+_UAV_TOUR = Motion(
+    _place(39.96, 116.31, 3.0),
+    straight(30.0) + accelerate(_UAV_SPEED, 20.0) + climb(8 * _DEG, 40.0),
+    _UAV_LOOP,
+    coordinated=True,
+)
+
 _SINGLE = GnssErrors((1.5, 1.5, 2.5), (0.08, 0.08, 0.12))
 _FIXED = GnssErrors((0.015, 0.015, 0.03), (0.03, 0.03, 0.05), status=FixStatus.FIXED)
 _UAV_FIXES = GnssErrors((5.0, 5.0, 8.0), (0.05, 0.05, 0.05))
@@ -120,6 +127,7 @@ _UAV_LEVER = (0.2, 0.0, -0.3)
 _CONSUMER_NOISE = ImuNoise(0.01 * _DEG, 2e-3, 0.5 * _DEG, 30 * _MG, 5e-4 * _DEG, 1e-4)
 _INDUSTRIAL_NOISE = ImuNoise(0.004 * _DEG, 8e-4, 0.15 * _DEG, 8 * _MG, 1e-4 * _DEG, 3e-5)
 _TACTICAL_NOISE = ImuNoise(0.1 * _DEG / 60, 3e-4, 5 * _DPH, 1.5 * _MG, 0.1 * _DPH, 5e-6)
+_TOUR_NOISE = ImuNoise(0.0001 * _DPH, 0.001 * _MG, 0.03 * _DPH, 0.1 * _MG, 0.0, 0.0)
 _NAVIGATION_NOISE = ImuNoise(0.003 * _DEG / 60, 5e-5, 0.02 * _DPH, 0.05 * _MG, 2e-4 * _DPH, 2e-7)
 _CONSUMER = ImuErrors(_CONSUMER_NOISE, gyro_quantum=0.0076 * _DEG, accel_quantum=0.0012)
 _INDUSTRIAL = ImuErrors(_INDUSTRIAL_NOISE)
@@ -227,6 +235,15 @@ _ALL = (
         Journey(_SPIRAL, 595.0, increments=True, lever_b=_UAV_LEVER),
         _NAVIGATION,
         GnssErrors((5.0, 5.0, 8.0), None),
+    ),
+    Scenario(
+        "uav-biased-fixes",
+        "UAV flight of 1932 s from rest, gyros of 0.03 deg/h; fixes at 1 Hz whose biases are drawn once and stay.",
+        Journey(_UAV_TOUR, 1932.0, increments=True),
+        ImuErrors(_TOUR_NOISE),
+        GnssErrors(
+            (8.0, 8.0, 4.0), (0.3, 0.3, 0.3), position_bias_std=(0.111, 0.00085, 5.0), velocity_bias_std=(0.1, 0.1, 0.9)
+        ),
     ),
     _BALLISTIC,
     replace(

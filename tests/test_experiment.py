@@ -16,6 +16,7 @@ from pipelines.experiment import Arm, ArmOutcome, NoiseClaim, Outcome, Published
 from pipelines.experiment_report import write_experiment
 from pipelines.experiment_summary import published_orders, rmse_figures, summarise_experiment
 from pipelines.experiments import EXPERIMENTS
+from pipelines.perturbed import Perturbation
 from pipelines.restarted import Restarted
 from pipelines.told_noise import NoiseRatio, StartErrors, displace_start, tell
 from synthetic_logs.scenarios import SCENARIOS
@@ -282,6 +283,44 @@ def test_fixes_are_told_likewise(name):
     else:
         rho = np.exp(-1 / settings.correlation_time)
         np.testing.assert_allclose(variance, settings.position_std[0] ** 2 + 9 * (1 + rho) / (1 - rho))
+
+
+def test_oracle_and_clairvoyant_are_told_the_biases_of_fixes():
+    log = synthetic_logs.simulate(synthetic_logs.with_duration(SCENARIOS["uav-biased-fixes"], 100.0), 2)
+    errors = log.fix_errors
+    assert np.abs(errors.bias_pos[2]) > 0.1
+    assert np.abs(errors.bias_vel).min() > 1e-3
+    for knowledge in ("moments", "model"):
+        told = tell(log, knowledge).fixes
+        np.testing.assert_allclose(log.fixes.vel_n - told.vel_n, np.tile(errors.bias_vel, (len(told), 1)), atol=1e-12)
+        np.testing.assert_allclose(earth.ned_between(told.lla[5], log.fixes.lla[5]), errors.bias_pos, atol=1e-6)
+        np.testing.assert_array_equal(told.cov_pos, log.fixes.cov_pos)
+
+
+def test_predictions_are_perturbed_once_an_epoch_and_not_for_those_told():
+    """With fixes that count for nothing the errors add up: 3 m and 0.1 m/s in each of ten epochs."""
+    whole = EXPERIMENTS["psteckf-uav"]
+    scenario = synthetic_logs.with_duration(whole.scenario, 40.0)
+    experiment = replace(
+        whole,
+        scenario=replace(scenario, gnss=replace(scenario.gnss, position_std=(1e5,) * 3, velocity_std=(1e5,) * 3)),
+        arms=(Arm("wrong", "ekf"), Arm("told", "ekf", told="model")),
+        perturbations=(Perturbation(11.0, 20.0, (3.0, 0.0, 0.0), (0.0, 0.1, 0.0)),),
+    )
+    outcome = run_seed(experiment, 1)
+    shift = outcome.arms["wrong"].errors - outcome.arms["told"].errors
+    before, after = (int(np.searchsorted(outcome.t_s, t)) for t in (10.5, 20.5))
+    np.testing.assert_allclose(shift[before, :6], 0, atol=1e-3)
+    np.testing.assert_allclose(shift[after, [0, 4]], [30, 1], atol=1e-2)
+
+
+def test_an_arm_may_have_options_of_its_own():
+    whole = EXPERIMENTS["psteckf-uav"]
+    scenario = synthetic_logs.with_duration(whole.scenario, 40.0)
+    wide = replace(whole.options, noise_scale=3.0)
+    outcome = run_seed(replace(whole, scenario=scenario, arms=(Arm("all", "ekf"), Arm("own", "ekf", options=wide))), 1)
+    nees = {label: np.nanmean(arm.nees[:, 0]) for label, arm in outcome.arms.items()}
+    assert nees["own"] < 0.5 * nees["all"]
 
 
 def test_command_lists_and_refuses(capsys, tmp_path):

@@ -58,7 +58,8 @@ class PartialTracking:
         inflated = cov
         if factor > 1:
             variance = np.diagonal(moved)
-            room = np.maximum(limits - np.diagonal(cov)[:n], 0) / np.where(variance > 0, variance, np.inf)
+            room = np.zeros(n)
+            np.divide(np.maximum(limits - np.diagonal(cov)[:n], 0), variance, out=room, where=variance > 0)
             share = np.sqrt(np.minimum(factor - 1, room))
             inflated = cov.copy()
             inflated[:n, :n] += share[:, None] * moved * share

@@ -35,7 +35,8 @@ __all__ = ["ConsideredAiding", "PartialTracker", "Schmidt", "Setup", "set_up"]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Schmidt(Linearised):
-    """The first-order rule with a gain of zero for the states behind the first `estimated`, whose variances stay told (p,)."""
+    """A rule that is of first order at the measurement, with a gain of zero for the states behind the first `estimated`, whose
+    variances stay told (p,)."""
 
     rule: MomentRule
     estimated: int
@@ -165,7 +166,7 @@ def set_up(aiding: Aiding, model: ErrorModel, method: Method, options: FilterOpt
         )
     if not isinstance(method.rule, Linearised) or method.calibration is not None or method.weighting is not None:
         raise LogError(
-            "filter: consider parameters need a single filter of first order that goes over the log once, which "
+            "filter: consider parameters need a single filter that goes over the log once, which "
             f"'{method.name}' is not; set consider.every_method = false, or take 'eckf'"
         )
     considered = ConsideredModel.of(model, options.consider)

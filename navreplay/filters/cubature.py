@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from navreplay.error_models.clocked import ClockedModel
+from navreplay.error_models.considered import ConsideredModel
 from navreplay.error_models.error_model import ErrorModel, MotionModel
 from navreplay.error_models.ned import NedErrorModel, Propagated
 from navreplay.error_models.pointwise import PointwiseModel
@@ -51,11 +52,14 @@ class Cubature(Linearised):
     ) -> Propagated:
         """From state and cov (n, n) before step `first` to the nodes behind ends (k,) steps; the state is moved to the mean of
         the points at each."""
-        if isinstance(model, ClockedModel):
-            model = replace(model, motion=self._by_points(model.motion))
-        elif isinstance(model, NedErrorModel):
-            model = self._by_points(model)
-        return model.propagate(state, cov, steps, first, ends, interval, keep)
+        return self._by_points(model).propagate(state, cov, steps, first, ends, interval, keep)
 
-    def _by_points(self, motion: MotionModel) -> MotionModel:
+    def _by_points(self, model: ErrorModel) -> ErrorModel:
+        if isinstance(model, ConsideredModel):
+            return replace(model, inner=self._by_points(model.inner))
+        if isinstance(model, ClockedModel):
+            return replace(model, motion=self._motion_by_points(model.motion))
+        return self._motion_by_points(model) if isinstance(model, NedErrorModel) else model
+
+    def _motion_by_points(self, motion: MotionModel) -> MotionModel:
         return PointwiseModel(motion.noise, self.attitude_states) if isinstance(motion, NedErrorModel) else motion
