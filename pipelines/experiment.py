@@ -15,17 +15,23 @@ from navreplay.filters.presets import Method, build_method
 from navreplay.filters.run import run_filter
 from navreplay.metrics import evaluate
 from navreplay.options import FilterOptions
-from navreplay.solution import Solution
+from navreplay.rotation import matrix_from_quat
+from navreplay.solution import Solution, WeightSeries
 from navreplay.timeline import Floats, LogError, Times
 from pipelines.perturbed import Perturbation, Perturbed
 from pipelines.restarted import Restarted
 from pipelines.told_noise import Knowledge, NoiseRatio, StartErrors, compare_noise, displace_start, tell
+from pipelines.told_process import ToldProcess
+from synthetic_logs.ballistic import BallisticFlight
 from synthetic_logs.simulation import Journey, Scenario, SyntheticLog, simulate, truth_at
 
 __all__ = [
+    "DEGREES",
+    "LAUNCH_ARCSEC",
     "QUANTITIES",
     "Arm",
     "ArmOutcome",
+    "AttitudeScale",
     "Experiment",
     "NoiseClaim",
     "OrderClaim",
@@ -38,6 +44,20 @@ __all__ = [
 ]
 
 QUANTITIES = ("position", "velocity", "attitude")
+
+
+@dataclass(frozen=True, slots=True)
+class AttitudeScale:
+    """In what attitude errors are told: unit, how many of it are a radian, and what their three components are called."""
+
+    unit: str
+    per_radian: float
+    axes: tuple[str, str, str]
+
+
+DEGREES = AttitudeScale("deg", float(np.degrees(1.0)), ("north", "east", "heading"))
+LAUNCH_ARCSEC = AttitudeScale("arcsec", float(np.degrees(3600.0)), ("roll", "yaw", "pitch"))
+"""Of a ballistic flight, whose attitude errors are resolved in its launch frame."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +133,8 @@ class Experiment:
     """Everything that decides an experiment but the seeds. description is one line, paper names the source. arms: the first is
     the reference of paired differences. drawn: labels of up to six arms that the plots show. start: errors that every filter
     starts with, beside those of the alignment in options; None: those of the first fix. perturbations: of what arms predict
-    that are not told the model. notes: readings, choices."""
+    that are not told the model. changes: times [s] at which another hypothesis of a bank becomes the true one, and its label.
+    attitude: how its errors are told. notes: readings, choices."""
 
     name: str
     description: str
@@ -129,19 +150,22 @@ class Experiment:
     published_noise: tuple[PublishedNoise, ...] = ()
     start: StartErrors | None = None
     perturbations: tuple[Perturbation, ...] = ()
+    changes: tuple[tuple[float, str], ...] = ()
+    attitude: AttitudeScale = DEGREES
     notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ArmOutcome:
-    """One arm on one seed. errors (k, 9): position NED [m], velocity NED [m/s] and rotation vector NED [rad], estimated minus
-    true. nees (k, 3): of the three. Both NaN where the solution does not reach. noise: by kind of measurement. epochs: with a
-    measurement."""
+    """One arm on one seed. errors (k, 9): position NED [m], velocity NED [m/s] and rotation vector [rad], in NED or, of a
+    ballistic flight, in its launch frame, estimated minus true. nees (k, 3): of the three. Both NaN where the solution does not
+    reach. noise: by kind of measurement. epochs: with a measurement. weights: of a bank."""
 
     errors: Floats
     nees: Floats
     noise: Mapping[str, NoiseRatio]
     epochs: int
+    weights: WeightSeries | None = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -218,6 +242,8 @@ def _build(arm: Arm, experiment: Experiment, log: SyntheticLog) -> Method:
         method = replace(method, adapter=Restarted(method.adapter, times))
     if experiment.perturbations and arm.told != "model":
         method = replace(method, rule=Perturbed(experiment.perturbations, start_ns))
+    if log.scenario.imu.noise_windows and arm.told != "log":
+        method = replace(method, rule=ToldProcess(log.scenario.imu.noise_windows, start_ns))
     return method
 
 
@@ -236,5 +262,11 @@ def _judge(solution: Solution, log: SyntheticLog, t_ns: Times) -> ArmOutcome:
     for i, quantity in enumerate(QUANTITIES):
         errors[at, 3 * i : 3 * i + 3] = judged[quantity].error
         nees[at, i] = judged[quantity].nees
+    motion = log.scenario.journey.motion
+    if isinstance(motion, BallisticFlight):
+        elapsed = (t_ns - log.scenario.journey.start_ns) / 1e9
+        level = np.tile([1.0, 0.0, 0.0, 0.0], (len(t_ns), 1))
+        q_ln = motion.frame.from_earth(elapsed, reference.lla, reference.vel_n, level).q_lb
+        errors[:, 6:] = np.einsum("kij,kj->ki", matrix_from_quat(q_ln), errors[:, 6:])
     epochs = len(np.unique(np.concatenate([np.empty(0, np.int64), *(series.t_ns for series in solution.innovations)])))
-    return ArmOutcome(errors, nees, compare_noise(solution.innovations, log), epochs)
+    return ArmOutcome(errors, nees, compare_noise(solution.innovations, log), epochs, solution.weights)

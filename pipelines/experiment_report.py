@@ -1,12 +1,13 @@
 """The report of an experiment: tables, plots and files."""
 
 from collections.abc import Sequence
-from functools import partial
+from functools import partial, reduce
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from navreplay.solution import WeightSeries
 from navreplay.timeline import Floats, LogError
 from pipelines.experiment import QUANTITIES, Experiment, Outcome
 from pipelines.experiment_summary import SETTLED, WHOLE, summarise_experiment
@@ -16,6 +17,7 @@ from pipelines.report_html import render_html
 from pipelines.report_markdown import render_markdown
 from pipelines.svg import Layer, Panel, draw_time_panels
 from pipelines.table import Figure, Table, figure_text
+from pipelines.weight_figures import weight_panels
 from pipelines.whole_file import write_whole
 
 __all__ = ["experiment_figures", "experiment_plots", "experiment_tables", "write_experiment"]
@@ -45,10 +47,12 @@ def write_experiment(experiment: Experiment, outcomes: Sequence[Outcome], out_di
 
 
 def experiment_figures(report: Report) -> tuple[Figure, ...]:
-    """A headline per arm: its position error in the first published stretch, else over the whole drive."""
-    stretch = report["published"][0]["stretch"] if report["published"] else WHOLE.name
+    """A headline per arm: its error in the quantity and stretch published first, else of position over the whole drive."""
+    published = report["published"][0] if report["published"] else {"stretch": WHOLE.name, "quantity": "position"}
+    stretch, quantity = published["stretch"], published["quantity"].split()[0]
+    unit = report["units"][quantity]
     return tuple(
-        Figure(label, _interval_text(arm["stretches"][stretch]["rmse"]["position"], "m"), f"3-D position RMSE, {stretch}")
+        Figure(label, _interval_text(arm["stretches"][stretch]["rmse"][quantity], unit), f"3-D {quantity} RMSE, {stretch}")
         for label, arm in report["arms"].items()
     )
 
@@ -66,10 +70,12 @@ def experiment_tables(report: Report) -> tuple[Table, ...]:
     tables = [
         Table("Conclusions", ("",), tuple((text,) for text in report["conclusions"])),
         *(_error_table(report, quantity, stretches) for quantity in QUANTITIES),
+        *(_component_table(report, stretch) for stretch in report["stretches"]),
         _order_table(report),
         _noise_table(report, stretches),
         *(_mean_noise_table(report, stretch) for stretch in report["stretches"]),
         _settling_table(report),
+        _switching_table(report),
         *(_nees_table(report, quantity, stretches) for quantity in QUANTITIES),
         _arm_table(report),
         Table("Notes", ("",), tuple((text,) for text in report["notes"])),
@@ -92,6 +98,35 @@ def _error_table(report: Report, quantity: str, stretches: Sequence[str]) -> Tab
     note = f"Root mean square of the 3-D error: mean over {count} seeds and the 95 % interval of that mean."
     title = f"{quantity.capitalize()} error [{report['units'][quantity]}]"
     return Table(title, ("", *stretches, *heads), rows, note)
+
+
+def _component_table(report: Report, stretch: str) -> Table:
+    """Of components that a paper has published by themselves."""
+    published = {row["quantity"]: row for row in report["published"] if row["stretch"] == stretch and " " in row["quantity"]}
+    heads = [head for name in published for head in (f"{name} [{report['units'][name.split()[0]]}]", "published")]
+    rows = tuple(
+        (
+            label,
+            *(
+                cell
+                for name, row in published.items()
+                for cell in (_interval_text(arm["stretches"][stretch]["rmse"][name]), figure_text(row["figures"].get(label)))
+            ),
+        )
+        for label, arm in report["arms"].items()
+        if published
+    )
+    return Table(f"Components, {stretch}", ("", *heads), rows, "Root mean square: mean over seeds and its 95 % interval.")
+
+
+def _switching_table(report: Report) -> Table:
+    rows = tuple(
+        (label, f"{change['at_s']:g} s", change["hypothesis"], figure_text(change["mean_s"]), str(change["seeds"]))
+        for label, arm in report["arms"].items()
+        for change in arm["switching_s"]
+    )
+    note = "Until the weight of the hypothesis that is true from then on is the largest; mean over the seeds where it ever is."
+    return Table("Time to switch [s]", ("", "from", "true hypothesis", "seconds", "seeds"), rows, note)
 
 
 def _order_table(report: Report) -> Table:
@@ -203,7 +238,7 @@ def experiment_plots(experiment: Experiment, outcomes: Sequence[Outcome]) -> tup
     duration = experiment.scenario.journey.duration
     shades = tuple(window for stretch in experiment.stretches for window in stretch.windows)
     count = len(outcomes)
-    errors = draw_time_panels(_error_panels(outcomes, styles), duration, shades)
+    errors = draw_time_panels(_error_panels(experiment, outcomes, styles), duration, shades)
     plots = [
         Plot("Errors", f"Log10 of the root mean square over {count} seeds of the 3-D errors; stretches shaded.", legend, errors)
     ]
@@ -211,13 +246,29 @@ def experiment_plots(experiment: Experiment, outcomes: Sequence[Outcome]) -> tup
     if noise:
         note = f"Median over {_NOISE_BIN_S:g} s and all seeds of log10 of the variance used over the true one; 0 is right."
         plots.append(Plot("R used over R true", note, legend, draw_time_panels(noise, duration, shades)))
-    return tuple(plots)
+    return (*plots, *_weight_plots(experiment, outcomes, shades))
 
 
-def _error_panels(outcomes: Sequence[Outcome], styles: dict[str, str]) -> list[Panel]:
+def _weight_plots(experiment: Experiment, outcomes: Sequence[Outcome], shades: tuple[tuple[float, float], ...]) -> list[Plot]:
+    """For every bank, the mean over seeds of the weights of its hypotheses."""
+    journey, plots = experiment.scenario.journey, []
+    for arm in experiment.arms:
+        series = [weights for o in outcomes if arm.label in o.arms and (weights := o.arms[arm.label].weights) is not None]
+        if series and len(series[0].labels) > 1:
+            # seeds share their epochs but for some that a gate may refuse
+            t_ns = reduce(np.intersect1d, [weights.t_ns for weights in series])
+            mean = np.mean([weights.values[np.isin(weights.t_ns, t_ns)] for weights in series], axis=0)
+            panels, legend = weight_panels(WeightSeries(t_ns, series[0].labels, mean), journey.start_ns)
+            drawing = draw_time_panels(panels, journey.duration, shades)
+            plots.append(Plot(f"Weights: {arm.label}", f"Mean over {len(series)} seeds.", legend, drawing))
+    return plots
+
+
+def _error_panels(experiment: Experiment, outcomes: Sequence[Outcome], styles: dict[str, str]) -> list[Panel]:
+    attitude = experiment.attitude
     panels = []
     for i, (quantity, unit, factor) in enumerate(
-        (("position", "m", 1), ("velocity", "m/s", 1), ("attitude", "deg", 180 / np.pi))
+        (("position", "m", 1.0), ("velocity", "m/s", 1.0), ("attitude", attitude.unit, attitude.per_radian))
     ):
         layers = []
         for label, style in styles.items():

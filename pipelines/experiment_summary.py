@@ -1,22 +1,21 @@
 """What an experiment has shown: figures over its seeds, and which of the paper's statements they support."""
 
 from collections.abc import Iterable, Sequence
-from itertools import combinations
+from itertools import combinations, pairwise
 from typing import Any
 
 import numpy as np
 from scipy.special import chdtri, stdtrit
 
 from navreplay.timeline import Floats
-from pipelines.experiment import QUANTITIES, ArmOutcome, Experiment, OrderClaim, Outcome, Stretch
+from pipelines.experiment import DEGREES, QUANTITIES, ArmOutcome, AttitudeScale, Experiment, OrderClaim, Outcome, Stretch
 from pipelines.plain_data import plain_data
 from pipelines.report import Report
 
 __all__ = ["SETTLED", "WHOLE", "published_orders", "rmse_figures", "stretch_rows", "summarise_experiment"]
 
 WHOLE = Stretch("whole drive", ((0.0, float("inf")),))
-_AXES = {"position": ("north", "east", "down"), "velocity": ("north", "east", "down"), "attitude": ("north", "east", "heading")}
-_UNITS = {"position": "m", "velocity": "m/s", "attitude": "deg"}
+_NED = ("north", "east", "down")
 _SCHEMA = "navreplay experiment 1"
 SETTLED = 1.5
 """Factor within which R counts as found."""
@@ -30,18 +29,19 @@ def stretch_rows(stretch: Stretch, t_s: Floats) -> np.ndarray:
     return rows
 
 
-def rmse_figures(errors: Floats) -> dict[str, float]:
+def rmse_figures(errors: Floats, attitude: AttitudeScale = DEGREES) -> dict[str, float]:
     """Root mean squares of errors (k, 9) by name: ``position`` of the 3-D error, ``position horizontal``, ``position north``
-    and so on, likewise velocity, and attitude [deg]. Rows of NaN are left out."""
+    and so on, likewise velocity, and attitude in its unit. Rows of NaN are left out."""
     squares = errors[np.isfinite(errors).all(axis=1)] ** 2
-    squares[:, 6:] *= np.degrees(1.0) ** 2
+    squares[:, 6:] *= attitude.per_radian**2
     means = squares.mean(axis=0) if len(squares) else np.full(9, np.nan)
     figures = {}
     for i, quantity in enumerate(QUANTITIES):
         part = means[3 * i : 3 * i + 3]
         figures[quantity] = float(np.sqrt(part.sum()))
         figures[f"{quantity} horizontal"] = float(np.sqrt(part[:2].sum()))
-        figures |= {f"{quantity} {axis}": float(np.sqrt(v)) for axis, v in zip(_AXES[quantity], part, strict=True)}
+        axes = attitude.axes if quantity == "attitude" else _NED
+        figures |= {f"{quantity} {axis}": float(np.sqrt(v)) for axis, v in zip(axes, part, strict=True)}
     return figures
 
 
@@ -50,7 +50,7 @@ def summarise_experiment(experiment: Experiment, outcomes: Sequence[Outcome]) ->
     published orders and explanations with what was measured of them."""
     stretches = (*experiment.stretches, WHOLE)
     figures = {
-        arm.label: {stretch.name: _seed_figures(arm.label, stretch, outcomes) for stretch in stretches}
+        arm.label: {stretch.name: _seed_figures(experiment, arm.label, stretch, outcomes) for stretch in stretches}
         for arm in experiment.arms
     }
     first = experiment.arms[0].label
@@ -62,6 +62,7 @@ def summarise_experiment(experiment: Experiment, outcomes: Sequence[Outcome]) ->
             "failures": {str(o.seed): o.failures[arm.label] for o in outcomes if arm.label in o.failures},
             "cpu_ms_per_epoch": _cpu_ms_per_epoch(arm.label, outcomes),
             "restarts": arm.restarts,
+            "switching_s": _switching_times(arm.label, experiment, outcomes),
             "stretches": {
                 stretch.name: {
                     "rmse": _intervals(figures[arm.label][stretch.name]),
@@ -99,7 +100,7 @@ def summarise_experiment(experiment: Experiment, outcomes: Sequence[Outcome]) ->
             "scenario": {"name": experiment.scenario.name, "description": experiment.scenario.description},
             "seeds": [outcome.seed for outcome in outcomes],
             "stretches": {stretch.name: stretch.windows for stretch in experiment.stretches},
-            "units": _UNITS,
+            "units": {"position": "m", "velocity": "m/s", "attitude": experiment.attitude.unit},
             "arms": arms,
             "published": [
                 {"source": p.source, "stretch": p.stretch, "quantity": p.quantity, "figures": dict(p.figures)}
@@ -121,16 +122,36 @@ def _arms_of(label: str, outcomes: Sequence[Outcome]) -> Iterable[tuple[Outcome,
     return ((outcome, outcome.arms[label]) for outcome in outcomes if label in outcome.arms)
 
 
-def _seed_figures(label: str, stretch: Stretch, outcomes: Sequence[Outcome]) -> dict[str, Floats]:
+def _seed_figures(experiment: Experiment, label: str, stretch: Stretch, outcomes: Sequence[Outcome]) -> dict[str, Floats]:
     """By figure: its value on every seed, NaN where the arm failed."""
-    names = rmse_figures(np.zeros((1, 9)))
+    names = rmse_figures(np.zeros((1, 9)), experiment.attitude)
     figures = {name: np.full(len(outcomes), np.nan) for name in names}
     for i, outcome in enumerate(outcomes):
         if label in outcome.arms:
             rows = stretch_rows(stretch, outcome.t_s)
-            for name, value in rmse_figures(outcome.arms[label].errors[rows]).items():
+            for name, value in rmse_figures(outcome.arms[label].errors[rows], experiment.attitude).items():
                 figures[name][i] = value
     return figures
+
+
+def _switching_times(label: str, experiment: Experiment, outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
+    """For each change, the time [s] that a bank takes until the weight of the hypothesis that is true from then on is the
+    largest: mean over the seeds where it is before the next change, and how many these are."""
+    banks = [(outcome, arm.weights) for outcome, arm in _arms_of(label, outcomes) if arm.weights is not None]
+    start_ns = experiment.scenario.journey.start_ns
+    found = []
+    for (at, hypothesis), (end, _) in pairwise((*experiment.changes, (np.inf, ""))):
+        taken = []
+        for _, weights in banks:
+            if hypothesis in weights.labels:
+                t_s = (weights.t_ns - start_ns) / 1e9
+                leads = weights.values.argmax(axis=1) == weights.labels.index(hypothesis)
+                times = t_s[leads & (t_s >= at) & (t_s < end)]
+                taken += [float(times[0] - at)] if len(times) else []
+        if banks:
+            mean = float(np.mean(taken)) if taken else float("nan")
+            found.append({"at_s": at, "hypothesis": hypothesis, "mean_s": mean, "seeds": len(taken)})
+    return found
 
 
 def _interval(values: Floats) -> dict[str, float]:

@@ -22,7 +22,7 @@ from navreplay.metrics import (
     summarise_outages,
 )
 from navreplay.outages import count_outages
-from navreplay.solution import InnovationSeries, Solution
+from navreplay.solution import InnovationSeries, Solution, WeightSeries
 from navreplay.time_scales import week_tow_from_gps
 from navreplay.timeline import Provenance
 from pipelines.plain_data import plain_data
@@ -52,6 +52,7 @@ def build_report(result: RunResult) -> Report:
         "within_3_sigma": None if evaluation is None else plain_data(evaluation.within_3_sigma),
         "nis": {kind: plain_data(judged) for kind, judged in compute_nis(solution.innovations).items()},
         "innovations": {series.kind: _describe_innovations(series) for series in solution.innovations},
+        "weights": None if solution.weights is None else _describe_weights(solution.weights),
         "satellites": None if result.sky is None else describe_satellites(result.sky, solution),
         "outages": {
             "count": len(outages),
@@ -138,6 +139,13 @@ def _describe_innovations(series: InnovationSeries) -> dict[str, Any]:
             for i, label in enumerate(series.labels)
         },
     }
+
+
+def _describe_weights(weights: WeightSeries) -> dict[str, dict[str, float]]:
+    """By hypothesis: mean over the epochs, last value, and share of the epochs at which it is the largest."""
+    leads = np.bincount(weights.values.argmax(axis=1), minlength=len(weights.labels)) / len(weights.t_ns)
+    rows = zip(weights.labels, weights.values.mean(axis=0).tolist(), weights.values[-1].tolist(), leads.tolist(), strict=True)
+    return {label: plain_data({"mean": mean, "last": last, "leads": share}) for label, mean, last, share in rows}
 
 
 def _describe_outage(errors: OutageErrors, origin_ns: int) -> dict[str, Any]:

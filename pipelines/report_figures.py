@@ -14,6 +14,7 @@ from pipelines.report import outage_errors
 from pipelines.result import RunResult
 from pipelines.sky_figures import plot_satellites, plot_shared_noise, sky_plots
 from pipelines.svg import Layer, Panel, draw_map, map_height
+from pipelines.weight_figures import plot_weights
 
 __all__ = ["outage_shades", "report_plots"]
 
@@ -40,6 +41,8 @@ def report_plots(result: RunResult) -> tuple[Plot, ...]:
         noise = plot_shared_noise if series.sources else _plot_noise
         plots += [_plot_innovations(series, solution, shades), noise(series, solution, shades)]
     plots += [plot_satellites(series, solution, shades) for series in measured if series.sources]
+    if solution.weights is not None:
+        plots.append(plot_weights(solution.weights, solution, shades))
     return (*plots, *_plot_biases(solution, shades))
 
 

@@ -9,14 +9,15 @@ from pipelines.rerun_paint import BLUE, GREEN, GREY, ORANGE, PALE, RED, send_dot
 from pipelines.rerun_sky import send_satellite_innovations, send_shared_noise
 from pipelines.result import RunResult
 
-__all__ = ["list_stacks", "send_biases", "send_errors", "send_innovations"]
+__all__ = ["list_stacks", "send_biases", "send_errors", "send_innovations", "send_weights"]
 
 _DPH = np.degrees(3600)
 _MG = 1 / 9.80665e-3
+_WEIGHT_COLORS = BLUE, ORANGE, GREEN, RED, PALE, GREY
 
 
 def list_stacks(result: RunResult) -> tuple[Stack, ...]:
-    """The groups of plots for which `send_errors`, `send_innovations` and `send_biases` send the series."""
+    """The groups of plots for which `send_errors`, `send_innovations`, `send_weights` and `send_biases` send the series."""
     stacks = []
     if result.evaluation is not None:
         for quantity, series in result.evaluation.errors.items():
@@ -31,6 +32,8 @@ def list_stacks(result: RunResult) -> tuple[Stack, ...]:
         labels = () if innovations.sources else innovations.labels
         stacks.append(Stack(f"Innovations: {kind}", f"/innovations/{kind}", labels, innovations.unit))
         stacks.append(Stack(f"Noise: {kind}", f"/noise/{kind}", labels, innovations.unit))
+    if result.solution.weights is not None:
+        stacks.append(Stack("Weights", "/weights", ("bank",), "1"))
     stacks.append(Stack("Gyro bias", "/bias/gyro", ("x", "y", "z"), "deg/h"))
     stacks.append(Stack("Accelerometer bias", "/bias/accelerometer", ("x", "y", "z"), "mg"))
     return tuple(stacks)
@@ -77,6 +80,16 @@ def _send_components(recording: rr.RecordingStream, series: InnovationSeries, so
         noise = f"/noise/{series.kind}/{label}"
         send_line(recording, f"{noise}/told", times, series.nominal_std[:, i], "told", GREY)
         send_line(recording, f"{noise}/used", times, series.noise_std[:, i], "used", ORANGE)
+
+
+def send_weights(recording: rr.RecordingStream, solution: Solution) -> None:
+    """Weights of a bank's hypotheses."""
+    if solution.weights is None:
+        return
+    times = time_columns(solution.weights.t_ns, solution)
+    for i, label in enumerate(solution.weights.labels):
+        color = _WEIGHT_COLORS[i % len(_WEIGHT_COLORS)]
+        send_line(recording, f"/weights/bank/hypothesis_{i + 1}", times, solution.weights.values[:, i], label, color)
 
 
 def send_biases(recording: rr.RecordingStream, solution: Solution) -> None:

@@ -14,7 +14,7 @@ from navreplay.timeline import FixStatus, Floats
 from pipelines.report import outage_errors
 from pipelines.rerun_layout import build_layout
 from pipelines.rerun_paint import BLUE, GREY, PALE, RED, time_columns
-from pipelines.rerun_series import list_stacks, send_biases, send_errors, send_innovations
+from pipelines.rerun_series import list_stacks, send_biases, send_errors, send_innovations, send_weights
 from pipelines.rerun_sky import send_sky
 from pipelines.result import RunResult
 
@@ -60,6 +60,7 @@ def write_recording(path: Path, result: RunResult) -> None:
         if result.sky is not None:
             send_sky(recording, result.sky, solution)
         send_innovations(recording, solution)
+        send_weights(recording, solution)
         send_biases(recording, solution)
         _send_events(recording, result)
         recording.flush()

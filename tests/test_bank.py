@@ -19,7 +19,13 @@ from navreplay.metrics import evaluate
 from navreplay.options import FilterOptions
 from navreplay.solution import Solution
 from navreplay.timeline import LogError, Timeline
+from pipelines.process import Drive, filter_drive
+from pipelines.report import build_report
+from pipelines.report_figures import report_plots
+from pipelines.rerun_view import write_recording
+from pipelines.spec import validate
 from tests.test_adapter_consistency import NOISE, OBSERVATION, PROCESS_NOISE, START, TRANSITION
+from tests.test_rerun_view import read_entity
 
 BANKS = ("mmae", "mmae-floor", "immae")
 SECOND = 1_000_000_000
@@ -238,3 +244,17 @@ def test_a_switch_is_told():
 def test_wrong_parameters_are_refused_in_one_line(parameters, message):
     with pytest.raises(LogError, match=message):
         build_method("mmae", parameters)
+
+
+def test_weights_are_in_report_and_recording(tmp_path):
+    timeline, _ = drive("car-short")
+    config = validate({"filter": {"name": "immae"}, "imu": {"grade": "industrial"}}, "test")
+    result = filter_drive(Drive(timeline, ()), config)
+    weights = build_report(result)["weights"]
+    assert list(weights) == ["Q × 1", "Q × 10", "Q × 100", "Q × 1000", "Q × 10000"]
+    assert sum(hypothesis["last"] for hypothesis in weights.values()) == pytest.approx(1, abs=1e-8)
+    assert sum(hypothesis["leads"] for hypothesis in weights.values()) == pytest.approx(1, abs=1e-8)
+    assert [plot.title for plot in report_plots(result)].count("Weights of the hypotheses") == 1
+    write_recording(tmp_path / "recording.rrd", result)
+    recorded = read_entity(tmp_path / "recording.rrd", "/weights/bank/hypothesis_1")["Scalars:scalars"].combine_chunks()
+    np.testing.assert_allclose(recorded.flatten().to_numpy(), result.solution.weights.values[:, 0])

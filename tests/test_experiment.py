@@ -225,7 +225,7 @@ def test_every_experiment_names_what_it_has():
     for experiment in EXPERIMENTS.values():
         labels = {arm.label for arm in experiment.arms}
         stretches = {stretch.name for stretch in experiment.stretches}
-        names = set(rmse_figures(np.zeros((1, 9))))
+        names = set(rmse_figures(np.zeros((1, 9)), experiment.attitude))
         assert set(experiment.drawn) <= labels
         assert len(experiment.drawn) <= 6
         for claim in (*published_orders(experiment), *experiment.orders):
