@@ -342,7 +342,7 @@ def _fade(x, h, tau, n):
 
 @njit(cache=True)
 def _multiply_left(phi, decay, total, work):
-    """total (n, c) <- F total in place, F = [phi; diag(decay)]; c at most n."""
+    """total (n, c) <- F total in place, F = [phi; diag(decay)]; work has c columns at least."""
     n, c = total.shape
     for i in range(9):
         for j in range(c):
@@ -388,7 +388,7 @@ def propagate(
     cross = cross_start.copy()
     a = np.empty((9, n))
     phi = np.empty((9, n))
-    work = np.empty((9, n))
+    work = np.empty((9, max(n, cross.shape[1])))
     decay = np.ones(n - 9)
     c = np.empty((3, 3))
     c_start = np.empty((3, 3))

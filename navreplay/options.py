@@ -115,7 +115,8 @@ class RangeOptions:
     clock's frequency, and its random walk. system_offset_std [m]: of another constellation's clock offset against the first's,
     before it is seen; system_offset_walk [m/sqrt(s)]: its random walk. clock_jump [m]: a common jump of all pseudoranges beyond
     it is the clock's. pseudorange_noise_scale, range_rate_noise_scale: on the standard deviations, beside
-    FilterOptions.noise_scale.
+    FilterOptions.noise_scale. multipath_share: share of a pseudorange's variance that is not white but multipath, correlated
+    over multipath_time [s]; where it is positive, multipath is estimated, with a state for every satellite.
     """
 
     pseudorange_std: float = 1.0
@@ -132,6 +133,8 @@ class RangeOptions:
     system_offset_std: float = 300.0
     system_offset_walk: float = 0.01
     clock_jump: float = 150.0
+    multipath_share: float = 0.0
+    multipath_time: float = 20.0
     pseudorange_noise_scale: float = 1.0
     range_rate_noise_scale: float = 1.0
 

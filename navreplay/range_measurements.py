@@ -19,7 +19,7 @@ from navreplay.rotation import matrix_from_quat
 from navreplay.strapdown import NavState
 from navreplay.timeline import Floats
 
-__all__ = ["Antenna", "carried_antenna", "free_antenna", "range_measurement"]
+__all__ = ["Antenna", "RangeNoise", "carried_antenna", "free_antenna", "range_measurement"]
 
 
 class Antenna(NamedTuple):
@@ -31,6 +31,16 @@ class Antenna(NamedTuple):
     vel_n: Floats
     position_jacobian: Floats
     velocity_jacobian: Floats
+
+
+class RangeNoise(NamedTuple):
+    """Of all rows (n,): variance of the white noise of pseudoranges [m^2] and of range rates [m^2/s^2], standard deviation of
+    the multipath in pseudoranges [m], and which of the clock's c states is a row's multipath (-1: none is)."""
+
+    pseudorange: Floats
+    range_rate: Floats
+    multipath_std: Floats
+    multipath_state: NDArray[np.intp]
 
 
 def carried_antenna(state: NavState, lever_b: Floats, rate_b: Floats, size: int) -> Antenna:
@@ -52,16 +62,15 @@ def free_antenna(state: NavState, size: int) -> Antenna:
     return Antenna(earth.ecef_from_lla(state.lla), c_en, state.vel_n, position, velocity)
 
 
-def range_measurement(
-    antenna: Antenna, clock: Floats, epochs: RangeEpochs, rows: slice, variances: tuple[Floats, Floats]
-) -> Measurement:
+def range_measurement(antenna: Antenna, clock: Floats, epochs: RangeEpochs, rows: slice, noise: RangeNoise) -> Measurement:
     """Rows of corrected epochs against the antenna and the clock (c,): all pseudoranges (kind ``range``), then all range rates
     that are known (``range_rate``), labelled by satellite.
 
-    variances: of pseudoranges and rates of all rows (n,). Residuals in m and m/s. The states are those of motion, then the
-    clock's.
+    Residuals in m and m/s. The states are those of motion, then the clock's: offsets, drift, multipath.
     """
     group = epochs.group[rows]
+    drift = len(epochs.groups)
+    shaped, scale = noise.multipath_state[rows], noise.multipath_std[rows]
     rated = np.flatnonzero(np.isfinite(epochs.range_rate[rows]))
     # the receiver stamps by its own clock: the signals came that much before the stamp
     pos_e = antenna.pos_e - antenna.c_en @ antenna.vel_n * (clock[0] / SPEED_OF_LIGHT)
@@ -77,16 +86,19 @@ def range_measurement(
     # the line of sight itself turns with position
     turning = (approach_n - sight[rated] * rate[:, None]) / distance[rated, None]
     jacobian[m:, :n] = -sight[rated] @ antenna.velocity_jacobian - turning @ antenna.position_jacobian
-    jacobian[m:, -1] = 1.0
+    jacobian[m:, n + drift] = 1.0
+    multipath = np.zeros(m)
+    if len(clock) > drift + 1:
+        jacobian[np.arange(m), n + shaped] = scale
+        multipath = scale * clock[shaped]
     residual = np.concatenate(
         [
-            epochs.pseudorange[rows] - distance - clock[group],
-            epochs.range_rate[rows][rated] - rate - clock[-1],
+            epochs.pseudorange[rows] - distance - clock[group] - multipath,
+            epochs.range_rate[rows][rated] - rate - clock[drift],
         ]
     )
-    noise = np.zeros((m + len(rated), m + len(rated)))
-    noise.flat[:: m + len(rated) + 1] = np.concatenate([variances[0][rows], variances[1][rows][rated]])
-    return Measurement(residual, jacobian, noise, ("range",) * m + ("range_rate",) * len(rated), _labels(epochs, rows, rated))
+    white = np.diag(np.concatenate([noise.pseudorange[rows], noise.range_rate[rows][rated]]))
+    return Measurement(residual, jacobian, white, ("range",) * m + ("range_rate",) * len(rated), _labels(epochs, rows, rated))
 
 
 def _labels(epochs: RangeEpochs, rows: slice, rated: NDArray[np.intp]) -> tuple[str, ...]:

@@ -41,6 +41,11 @@ class RangeSection(Section):
     system_offset_walk_m_rts: NotNegative = Field(0.01, description="its random walk [m/sqrt(s)]")
     clock_jump_m: Positive = Field(150.0, description="a common jump of all pseudoranges beyond this is the clock's [m]")
 
+    multipath_share: Annotated[float, Field(ge=0, lt=1)] = Field(
+        0.0, description="share of a pseudorange's variance that is multipath; above 0 it is estimated for every satellite"
+    )
+    multipath_time_s: Positive = Field(20.0, description="time constant of multipath: minutes at rest, seconds at speed [s]")
+
     def options(self) -> RangeOptions:
         """The same for the filter."""
         return RangeOptions(
@@ -60,6 +65,8 @@ class RangeSection(Section):
             system_offset_std=self.system_offset_std_m,
             system_offset_walk=self.system_offset_walk_m_rts,
             clock_jump=self.clock_jump_m,
+            multipath_share=self.multipath_share,
+            multipath_time=self.multipath_time_s,
         )
 
 

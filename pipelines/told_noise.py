@@ -18,7 +18,8 @@ from synthetic_logs.surroundings import figure_at
 __all__ = ["Knowledge", "NoiseRatio", "StartErrors", "compare_noise", "displace_start", "tell"]
 
 Knowledge = Literal["log", "moments", "model"]
-"""log: what the log tells. moments: the true mean and variance at every time (the moment oracle). model (the clairvoyant): also
+"""log: what the log tells. moments: the true mean and variance at every time (the moment oracle); what the atmosphere departs
+from its models stays for a log, and belongs to the mean. model (the clairvoyant): also
 which measurements are outliers or of a mixture's wide part, and, for errors that are correlated in time, a variance of white
 noise with the same spectral density at low frequencies, sigma^2 (1 + rho) / (1 - rho): what a filter without shaping states
 can make of the true coloured-noise model."""
@@ -115,7 +116,7 @@ def _tell_ranges(
         rate_variance = rate_variance + known * figure("outlier_rate_std") ** 2 + grown * rate_correlated
     return replace(
         ranges,
-        pseudorange=ranges.pseudorange - errors.pseudorange_mean,
+        pseudorange=ranges.pseudorange - errors.pseudorange_mean - truth.delays.unmodelled,
         pseudorange_std=np.sqrt(variance),
         range_rate_std=np.sqrt(rate_variance),
     )

@@ -241,3 +241,32 @@ def test_masks_are_told_with_their_counts():
     )
     (text,) = events(solution, "left out")
     assert text == f"of {10 * len(SKY)} ranges are left out: 10 below 22 deg of elevation"
+
+
+def test_estimated_multipath_makes_the_covariance_honest():
+    """Under multipath of 20 s a filter that takes it for white noise believes what it averages; one with states does not."""
+    receiver = replace(SCENARIO.receiver, pseudorange_std=0.5, multipath_std=1.5)
+    scenario = replace(synthetic_logs.with_duration(SCENARIO, 90.0), receiver=receiver)
+    judged = {}
+    for share in (0.0, 0.8):
+        ranges = RangeOptions(clock_drift_walk=receiver.clock.frequency_walk, multipath_share=share, multipath_time=20.0)
+        nees = []
+        for seed in (1, 2):
+            drive = synthetic_logs.simulate(scenario, seed)
+            solution = run_filter(drive.timeline(), build_method("fixed"), options(ranges=ranges))
+            nees.append(normalised(solution, drive.truth, slice(0, 3))[-60:].mean())
+        judged[share] = np.mean(nees)
+    assert judged[0.0] > 15
+    assert 1.0 < judged[0.8] < 6.0
+
+
+def test_multipath_states_start_stationary_and_are_named():
+    ranges = make_ranges(5, noise=(0.5, 0.02))
+    solution = run_filter(
+        Timeline(ranges=ranges), build_method("fixed"), FilterOptions(ranges=RangeOptions(multipath_share=0.5), output_rate=0.0)
+    )
+    first = solution.state_names.index(f"multipath_{min(SKY)}")
+    assert solution.state_names[first:] == tuple(f"multipath_{name}" for name in sorted(SKY))
+    assert set(solution.state_units[first:]) == {"1"}
+    np.testing.assert_allclose(solution.cov[0][first:, first:], np.eye(len(SKY)))
+    assert (solution.std[-1, first:] < 1).all()

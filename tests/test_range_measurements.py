@@ -15,9 +15,9 @@ from navreplay.filters.range_gate import RangeGate
 from navreplay.measurements import Measurement, angular_rate
 from navreplay.options import GRADES, GateOptions, MotionOptions, RangeOptions
 from navreplay.range_epochs import arrange_ranges
-from navreplay.range_measurements import carried_antenna, free_antenna, range_measurement
+from navreplay.range_measurements import RangeNoise, carried_antenna, free_antenna, range_measurement
 from navreplay.strapdown import NavState, idle_steps
-from tests.range_samples import DRIFT, OFFSETS, PLACE, START_NS, make_ranges
+from tests.range_samples import DRIFT, OFFSETS, PLACE, SKY, START_NS, make_ranges
 
 LEVER = np.array([1.5, -0.7, -1.1])
 RATE_DTHETA = np.array([0.01, -0.02, 0.03])
@@ -30,30 +30,33 @@ def state_at_place() -> NavState:
     return replace(NavState.at(PLACE, np.array([14.0, -6.0, 0.8]), attitude), clock=CLOCK)
 
 
-def measure(state: NavState, has_imu: bool = True) -> Measurement:
+def measure(state: NavState, has_imu: bool = True, multipath: bool = False) -> Measurement:
     ranges = make_ranges(1)
     rate = ranges.range_rate.copy()
     rate[4] = np.nan
     epochs, _ = arrange_ranges(replace(ranges, range_rate=rate), RangeOptions())
-    variances = np.full(11, 4.0), np.full(11, 0.01)
+    shaped = 4 + np.arange(11) if multipath else np.full(11, -1)
+    noise = RangeNoise(np.full(11, 4.0), np.full(11, 0.01), np.linspace(0.5, 2.0, 11), shaped)
     size = 18 if has_imu else 9
     antenna = carried_antenna(state, LEVER, angular_rate(state, RATE_DTHETA, 0.05), size) if has_imu else free_antenna(state, 9)
-    return range_measurement(antenna, state.clock, epochs, slice(0, 11), variances)
+    return range_measurement(antenna, state.clock, epochs, slice(0, 11), noise)
 
 
-@pytest.mark.parametrize("has_imu", [True, False])
-def test_jacobian_equals_finite_differences(has_imu):
-    clock = ReceiverClock(("G", "E", "C"), RangeOptions())
+@pytest.mark.parametrize(("has_imu", "multipath"), [(True, False), (False, False), (True, True)])
+def test_jacobian_equals_finite_differences(has_imu, multipath):
+    clock = ReceiverClock(("G", "E", "C"), RangeOptions(), tuple(SKY) if multipath else ())
     motion = NedErrorModel(NOISE) if has_imu else FreeMotionModel(MotionOptions())
     model = ClockedModel(motion, clock)
     state = state_at_place()
-    jacobian = measure(state, has_imu).jacobian
-    sizes = np.concatenate([np.repeat([10.0, 0.1, 1e-4, 1e-3, 1e-3, 1e-3], 3)[: motion.size], np.full(4, 1.0)])
+    if multipath:
+        state = replace(state, clock=np.concatenate([CLOCK, np.linspace(-1, 1, 11)]))
+    jacobian = measure(state, has_imu, multipath).jacobian
+    sizes = np.concatenate([np.repeat([10.0, 0.1, 1e-4, 1e-3, 1e-3, 1e-3], 3)[: motion.size], np.full(clock.size, 1.0)])
     for i in range(model.size):
         d = np.zeros(model.size)
         d[i] = sizes[i]
-        plus = measure(model.retract(state, d), has_imu).residual
-        minus = measure(model.retract(state, -d), has_imu).residual
+        plus = measure(model.retract(state, d), has_imu, multipath).residual
+        minus = measure(model.retract(state, -d), has_imu, multipath).residual
         # measured minus predicted: the residual falls by what the prediction gains; the state moves towards the error
         column = (minus - plus) / (2 * sizes[i])
         np.testing.assert_allclose(jacobian[:, i], column, rtol=2e-3, atol=2e-5, err_msg=model.names[i])
@@ -70,13 +73,18 @@ def test_exact_ranges_leave_no_residual_and_missing_rates_are_left_out():
     np.testing.assert_allclose(np.diag(measurement.noise), [4.0] * 11 + [0.01] * 10)
 
 
-def test_clock_steps_compose():
+@pytest.mark.parametrize("sats", [(), ("E04", "G01", "G05")])
+def test_clock_steps_compose(sats):
     """Two steps one after the other are one step of their sum, in transition and in noise."""
-    clock = ReceiverClock(("G", "E"), RangeOptions())
+    clock = ReceiverClock(("G", "E"), RangeOptions(), sats)
     phi, q = clock.transitions(np.array([0.7, 1.3, 2.0])), clock.noises(np.array([0.7, 1.3, 2.0]))
     np.testing.assert_allclose(phi[1] @ phi[0], phi[2])
     np.testing.assert_allclose(phi[1] @ q[0] @ phi[1].T + q[1], q[2], rtol=1e-12)
     assert np.linalg.eigvalsh(q[2]).min() > 0
+    # multipath is stationary: what decays is replaced
+    shaped = slice(3, 3 + len(sats))
+    np.testing.assert_allclose((phi[2] @ phi[2].T + q[2])[shaped, shaped], np.eye(len(sats)), rtol=1e-12, atol=1e-15)
+    assert len(clock.names) == len(clock.units) == clock.size == 3 + len(sats)
 
 
 @pytest.mark.parametrize("model", ["velocity", "acceleration"])

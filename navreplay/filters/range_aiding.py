@@ -16,7 +16,7 @@ from navreplay.filters.update import Observed
 from navreplay.least_squares import fixes_of, solve_points
 from navreplay.measurements import Measurement, angular_rate, fix_noise
 from navreplay.options import FilterOptions
-from navreplay.range_measurements import Antenna, carried_antenna, free_antenna, range_measurement
+from navreplay.range_measurements import Antenna, RangeNoise, carried_antenna, free_antenna, range_measurement
 from navreplay.strapdown import NavState
 from navreplay.timeline import Floats, RangeSeries, Times
 
@@ -26,6 +26,8 @@ _MILLISECOND = SPEED_OF_LIGHT / 1000
 _ODD_JUMP_STD = 30.0
 _DRIFT_STD = 10.0
 """Of a clock drift [m/s] where the rates of the first epoch do not give it."""
+_DOUBT = 100.0
+"""Variance of a first position whose errors are estimated, over that of white noise."""
 
 
 class RangeAiding:
@@ -42,18 +44,27 @@ class RangeAiding:
         self._lever_b = lever_b
         self._options = options
         self._recorder = recorder
-        clock = ReceiverClock(self._points.groups, options.ranges)
+        sats = tuple(np.unique(self._epochs.sat).tolist()) if options.ranges.multipath_share > 0 else ()
+        clock = ReceiverClock(self._points.groups, options.ranges, sats)
         self._inertial = NedErrorModel(options.imu_noise)
         self._free = FreeMotionModel(options.motion)
         self.model = ClockedModel(self._inertial if has_imu else self._free, clock)
         self._has_imu = has_imu
-        scale = self._scale = options.noise_scale**2
-        range_scale = scale * options.ranges.pseudorange_noise_scale**2
-        rate_scale = scale * options.ranges.range_rate_noise_scale**2
-        self._variances = self._epochs.pseudorange_std**2 * range_scale, self._epochs.range_rate_std**2 * rate_scale
+        self._scale = options.noise_scale**2
+        self._drift = len(clock.groups)
+        self._noise = self._share_noise(sats)
         if left_out:
             counts = ", ".join(f"{count} {reason}" for reason, count in left_out.items())
             recorder.tell(int(ranges.t_ns[0]), "info", f"of {len(ranges)} ranges are left out: {counts}")
+
+    def _share_noise(self, sats: tuple[str, ...]) -> RangeNoise:
+        """White noise and multipath of all rows."""
+        options = self._options.ranges
+        variance = self._epochs.pseudorange_std**2 * self._scale * options.pseudorange_noise_scale**2
+        rate = self._epochs.range_rate_std**2 * self._scale * options.range_rate_noise_scale**2
+        state = self._drift + 1 + np.searchsorted(sats, self._epochs.sat) if sats else np.full(len(variance), -1)
+        white, multipath = variance * (1 - options.multipath_share), variance * options.multipath_share
+        return RangeNoise(white, rate, np.sqrt(multipath), state)
 
     @property
     def t_ns(self) -> Times:
@@ -88,13 +99,18 @@ class RangeAiding:
         at = np.concatenate([np.arange(3), np.arange(n, n + len(offsets))])[known]
         full[np.ix_(at, at)] = points.cov_pos[epoch][np.ix_(known, known)] * self._scale
         full[:3, :3] = cov[:3, :3]
-        drift = float(points.drift[epoch])
+        multipath = self.model.size - (n + self._drift + 1)
+        if multipath:
+            # the multipath behind this position comes again with the next epochs, and must not count twice
+            full[np.ix_(at, at)] += _DOUBT * points.cov_pos[epoch][np.ix_(known, known)] * self._scale
+            full[range(-multipath, 0), range(-multipath, 0)] = 1.0
+        drift, at_drift = float(points.drift[epoch]), n + self._drift
         if np.isfinite(drift):
-            full[-1, 3:6] = full[3:6, -1] = points.cov_vel[epoch, 3, :3] * self._scale
-            full[-1, -1] = points.cov_vel[epoch, 3, 3] * self._scale
+            full[at_drift, 3:6] = full[3:6, at_drift] = points.cov_vel[epoch, 3, :3] * self._scale
+            full[at_drift, at_drift] = points.cov_vel[epoch, 3, 3] * self._scale
         else:
-            drift, full[-1, -1] = self._drift_of_offsets(epoch), _DRIFT_STD**2
-        clock = np.append(np.where(seen, offsets, np.nanmean(offsets)), drift)
+            drift, full[at_drift, at_drift] = self._drift_of_offsets(epoch), _DRIFT_STD**2
+        clock = np.concatenate([np.where(seen, offsets, np.nanmean(offsets)), [drift], np.zeros(multipath)])
         return replace(state, clock=clock), full
 
     def _drift_of_offsets(self, epoch: int) -> float:
@@ -121,14 +137,15 @@ class RangeAiding:
         if jump:
             text = f"the receiver clock jumped by {jump / _MILLISECOND:+.6f} ms ({jump:+.1f} m); its offset follows"
             self._recorder.tell(int(self.t_ns[epoch]), "info", text)
-            state = replace(state, clock=state.clock + np.append(np.full(len(state.clock) - 1, jump), 0.0))
-            cov = cov.copy()
-            cov[n:-1, n:-1] += odd**2
+            clock, cov = state.clock.copy(), cov.copy()
+            clock[: self._drift] += jump
+            state = replace(state, clock=clock)
+            cov[n : n + self._drift, n : n + self._drift] += odd**2
             measurement = self._measure(antenna, state, rows)
         return Observed(measurement, state, cov)
 
     def _measure(self, antenna: Antenna, state: NavState, rows: slice) -> Measurement:
-        return range_measurement(antenna, state.clock, self._epochs, rows, self._variances)
+        return range_measurement(antenna, state.clock, self._epochs, rows, self._noise)
 
 
 def _find_clock_jump(measurement: Measurement, offset_std: float, limit: float) -> tuple[float, float]:
