@@ -234,7 +234,7 @@ def track(rule: Schmidt, tracking: PartialTracking | None, seed: int, epochs: in
 
 @pytest.mark.parametrize(
     ("tracking", "nees_band", "nis_band"),
-    [(None, (0.85, 1.15), (0.9, 1.1)), (PartialTracking(), (0.6, 0.95), (0.7, 0.95))],
+    [(None, (0.85, 1.15), (0.9, 1.1)), (PartialTracking(), (0.75, 1.1), (0.75, 0.95))],
 )
 def test_with_the_right_noise_nees_and_nis_stay_in_the_band(tracking, nees_band, nis_band):
     rule = Schmidt(Linearised(), 6, np.full(3, 4.0))

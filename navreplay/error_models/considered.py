@@ -30,27 +30,25 @@ _LEAST_SINE = 0.05
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ConsideredModel:
-    """The n states of inner and, behind them, p biases. std (13,): of all biases there are, in the units of the options;
-    those of which it is 0 have no state."""
+    """The n states of inner and, behind them, p biases: kept (p,) are their places among all that there are, std (p,) their
+    standard deviations in the units of the options."""
 
     inner: ErrorModel
+    kept: np.ndarray
     std: Floats
 
     @classmethod
     def of(cls, inner: ErrorModel, options: ConsiderOptions) -> "ConsideredModel":
-        """inner with the biases that the options name."""
+        """inner with the biases that the options name; those whose standard deviation is 0 have no state."""
         groups = options.position_rate, options.velocity_rate, options.position_bias, options.velocity_bias
-        return cls(inner, np.array([*(std for group in groups for std in group), options.zenith_delay]))
-
-    @property
-    def kept(self) -> np.ndarray:
-        """(p,) indices of the biases that have a state."""
-        return np.flatnonzero(self.std)
+        std = np.array([*(std for group in groups for std in group), options.zenith_delay])
+        kept = np.flatnonzero(std)
+        return cls(inner, kept, std[kept])
 
     @property
     def bias_cov(self) -> Floats:
         """P_pp (p, p)."""
-        return np.diag(self.std[self.kept] ** 2)
+        return np.diag(self.std**2)
 
     @property
     def size(self) -> int:
@@ -86,12 +84,13 @@ class ConsideredModel:
 
     def influence(self, measurement: Measurement) -> Floats:
         """N (m, p) of a measurement whose Jacobian (m, n) is that of the inner model (Lou et al., eq. 17)."""
-        kinds = np.array(measurement.kinds)
-        at_position, at_velocity = np.isin(kinds, ("position", "range")), np.isin(kinds, ("velocity", "range_rate"))
+        kinds = measurement.kinds
+        at_position = np.array([kind in ("position", "range") for kind in kinds])
+        at_velocity = np.array([kind in ("velocity", "range_rate") for kind in kinds])
         full = np.zeros((len(kinds), len(_NAMES)))
         full[at_position, 6:9] = measurement.jacobian[at_position, POSITION]
         full[at_velocity, 9:12] = measurement.jacobian[at_velocity, VELOCITY]
-        ranges = kinds == "range"
+        ranges = np.array([kind == "range" for kind in kinds])
         # a pseudorange falls with height by the sine of the elevation, and down is positive
         full[ranges, 12] = 1 / np.maximum(measurement.jacobian[ranges, 2], _LEAST_SINE)
         return np.asarray(full[:, self.kept])

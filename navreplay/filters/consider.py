@@ -7,7 +7,7 @@ Eq. (24), whose lower left block is that of an optimal gain, is not used.
 Assumes: biases are constant over the log, independent of each other, of the told covariance, and in the fix that a filter
 starts from as in all others.
 Fails: a bias that could be estimated is left in the solution; biases told too large make the filter lean on the IMU.
-When well specified: mean NEES per state 0.9 to 1.1, NIS per component 0.95 to 1.05 (psteckf: see the tracking's file).
+When well specified: mean NEES per state 0.85 to 1.15, NIS per component 0.9 to 1.1 (psteckf: see the tracking's file).
 """
 
 from dataclasses import dataclass, replace
