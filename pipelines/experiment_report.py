@@ -221,7 +221,9 @@ def _arm_table(report: Report) -> Table:
         (
             label,
             arm["method"],
-            ", ".join(f"{key} = {value}" for key, value in arm["parameters"].items()),
+            ", ".join(
+                [*(f"{k} = {v}" for k, v in arm["parameters"].items()), *(f"restarted at {t:g} s" for t in arm["restarts"])]
+            ),
             told[arm["told"]],
             figure_text(arm["cpu_ms_per_epoch"]),
             str(len(arm["failures"])),

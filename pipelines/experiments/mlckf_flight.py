@@ -42,7 +42,9 @@ NOTES = (
     "Judged halfway between fixes. Published figures are those of a receiver by itself (10.7 m, 0.087 m/s) and more, not of a "
     "filter that has converged: orders and ratios can be compared, metres cannot.",
     "No innovation gate. The reference lines are extended Kalman filters.",
-    "HRCKF widens the prior, so that its gain is larger, too; the source takes the gain of the unchanged prior.",
+    "HRCKF: gamma is not published. 30 initial standard deviations keep the filter consistent while R is right; the default of "
+    "10 widens heading, which straight flight hardly shows, until it means little. Its gain is that of the widened prior, in "
+    "the source that of the unchanged one.",
 )
 
 

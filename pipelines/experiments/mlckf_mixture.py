@@ -20,7 +20,7 @@ MLCKF_MIXTURE = Experiment(
     options=OPTIONS,
     arms=(
         Arm("CKF", "ckf"),
-        Arm("HRCKF", "hrckf"),
+        Arm("HRCKF", "hrckf", {"gamma": 30.0}),
         Arm("MCSCKF", "mcsckf"),
         Arm("MLCKF", "mlckf"),
         Arm("MLCKF, all epochs", "mlckf", {"window": 1000}),
