@@ -8,6 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import synthetic_logs
+from navreplay import _bank_kernel
+from navreplay.error_models.ned import Propagated
 from navreplay.filters.bank import Stack, mix, move_stack, update_stack
 from navreplay.filters.core import Gaussian, chi_square, condition
 from navreplay.filters.moments import Linearised
@@ -142,6 +144,36 @@ def test_immae_starts_anew_where_the_last_interval_contradicts_the_history():
     assert leaders[110:] == [1] * 40
 
 
+def over_an_epoch() -> Propagated:
+    """The tracker's transition and noise; its states and covariances do not matter."""
+    empty = np.zeros((1, 6, 6))
+    return Propagated(np.zeros((1, 6)), empty, empty, TRANSITION[None], PROCESS_NOISE[None])
+
+
+def test_hypotheses_move_by_the_transition_with_their_own_noise_and_so_does_the_mixture():
+    rng = np.random.default_rng(0)
+    roots, transitions, noise_roots = rng.normal(size=(3, 4, 4)), rng.normal(size=(2, 4, 4)), rng.normal(size=(2, 4, 4))
+    stack = Stack(rng.normal(size=(3, 4)), roots @ np.swapaxes(roots, 1, 2))
+    noises, scales, weights = (
+        noise_roots @ np.swapaxes(noise_roots, 1, 2),
+        np.array([0.5, 2.0, 30.0]),
+        np.array([0.2, 0.5, 0.3]),
+    )
+    stack = stack._replace(means=stack.means - weights @ stack.means)
+    told, cov = [], mix(stack, weights).cov
+    for step, noise in zip(transitions, noises, strict=True):
+        cov = step @ cov @ step.T + noise
+        told.append(cov)
+    moved = Propagated(np.zeros((2, 4)), np.array(told), np.zeros((2, 4, 0)), transitions, noises)
+    found = move_stack(stack, moved, scales, weights)
+    total = transitions[1] @ transitions[0]
+    for j, scale in enumerate(scales):
+        np.testing.assert_allclose(found.means[j], total @ stack.means[j], rtol=1e-12)
+        first = transitions[0] @ stack.covs[j] @ transitions[0].T + scale * noises[0]
+        np.testing.assert_allclose(found.covs[j], transitions[1] @ first @ transitions[1].T + scale * noises[1], rtol=1e-11)
+    np.testing.assert_allclose(moved.covariances[1], mix(found, weights).cov, rtol=1e-11, atol=1e-11)
+
+
 def track(weighting: Mmae, seed: int, epochs: int, true_scale: float = 1.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """NEES per state and NIS per component by epoch, and final weights, of a tracker of position and velocity in three axes
     whose process noise is true_scale times what the bank is told."""
@@ -154,7 +186,7 @@ def track(weighting: Mmae, seed: int, epochs: int, true_scale: float = 1.0) -> t
     nees, nis = [], []
     for epoch in range(1, epochs + 1):
         true = TRANSITION @ true + roots[1] @ rng.normal(size=6)
-        nominal, stack = TRANSITION @ nominal, move_stack(stack, TRANSITION, PROCESS_NOISE, q_scales)
+        nominal, stack = TRANSITION @ nominal, move_stack(stack, over_an_epoch(), q_scales, weights.values)
         residual = OBSERVATION @ (true - nominal) + roots[2] @ rng.normal(size=6)
         prior, noise = mix(stack, weights.values), NOISE * (weights.values @ r_scales)
         nis.append(chi_square(residual, OBSERVATION @ prior.cov @ OBSERVATION.T + noise) / 6)
@@ -225,6 +257,22 @@ def test_a_switch_is_told():
     timeline, options = drive("car-short")
     events = [event.text for event in run_filter(timeline, build_method("mmae"), options).events]
     assert sum("the bank follows Q × 1," in text for text in events) == 1
+
+
+def test_compiled_kernels_are_their_python_selves():
+    rng = np.random.default_rng(3)
+    roots = rng.normal(size=(2, 4, 4))
+    means, covs, noises = rng.normal(size=(2, 4)), roots @ np.swapaxes(roots, 1, 2), np.tile(np.eye(2), (2, 1, 1))
+    steps, jacobian, residual = rng.normal(size=(3, 4, 4)), rng.normal(size=(2, 4)), rng.normal(size=2)
+    outcomes = []
+    for carry, update in ((_bank_kernel.carry, _bank_kernel.update), (_bank_kernel.carry.py_func, _bank_kernel.update.py_func)):
+        m, p, mixture, likelihood = means.copy(), covs.copy(), np.zeros((3, 4, 4)), np.empty(2)
+        carry(steps, np.tile(np.eye(4), (3, 1, 1)), np.array([1.0, 5.0]), 0.7, mixture, m, p)
+        assert update(residual, jacobian, noises, m, p, likelihood)
+        assert not update(residual, jacobian, -1e3 * noises, m.copy(), p.copy(), np.empty(2))
+        outcomes.append((m, p, mixture, likelihood))
+    for compiled, plain in zip(*outcomes, strict=True):
+        np.testing.assert_allclose(compiled, plain, rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize(

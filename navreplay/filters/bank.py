@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from navreplay import _bank_kernel
 from navreplay.adapt.fixed import Fixed
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.error_models.ned import Propagated
@@ -59,31 +60,27 @@ def _average(weights: Floats, matrices: Floats) -> Floats:
     return np.asarray((weights @ matrices.reshape(len(weights), -1)).reshape(matrices.shape[1:]))
 
 
-def move_stack(stack: Stack, phi: Floats, noise: Floats, q_scales: Floats) -> Stack:
-    """The hypotheses behind transition phi (n, n), each with its own multiple of noise (n, n): q_scales (M,)."""
-    return Stack(stack.means @ phi.T, phi @ stack.covs @ phi.T + q_scales[:, None, None] * noise)
+def move_stack(stack: Stack, moved: Propagated, q_scales: Floats, weights: Floats) -> Stack:
+    """The hypotheses behind the last node of moved, each with its own multiple q_scales (M,) of the noise. The covariances of
+    moved, which is the mixture's with told noise, become those of the mixture with weights (M,)."""
+    means, covs = stack.means.copy(), stack.covs.copy()
+    beyond_told = float(weights @ q_scales) - 1
+    _bank_kernel.carry(moved.transitions, moved.noises, q_scales, beyond_told, moved.covariances, means, covs)
+    return Stack(means, covs)
 
 
 def update_stack(prior: Stack, residual: Floats, jacobian: Floats, noises: Floats) -> Update:
     """Every hypothesis given residual (m,) = H x + v against the nominal, jacobian H (m, n), by its own R of noises (M, m, m).
 
-    Joseph form (11), written as in `core.condition`; likelihood (14). Raises LogError where an S is not positive definite.
+    With S = L L' and W = L^-1 H P the posterior P - W' W is that of the Joseph form (11) at the optimal gain, symmetric as it
+    stands; likelihood (14). Raises LogError where an S is not positive definite.
     """
-    own = residual - prior.means @ jacobian.T
-    seen = jacobian @ prior.covs
-    spread = seen @ jacobian.T + noises
-    solved = np.linalg.solve(spread, np.concatenate([seen, own[:, :, None]], axis=2))
-    signs, logs = np.linalg.slogdet(spread)
-    squares = (own * solved[:, :, -1]).sum(axis=1)
-    if (signs <= 0).any() or (squares < 0).any():
+    means, covs, log_likelihood = prior.means.copy(), prior.covs.copy(), np.empty(len(noises))
+    if not _bank_kernel.update(residual, jacobian, noises, means, covs, log_likelihood):
         raise LogError(
             "filter: the covariance of an innovation is not positive definite; are the scales of the bank plausible?"
         )
-    gains = np.swapaxes(solved[:, :, :-1], 1, 2)
-    shared = gains @ seen
-    covs = prior.covs - shared - np.swapaxes(shared, 1, 2) + gains @ spread @ np.swapaxes(gains, 1, 2)
-    means = prior.means + (gains @ own[:, :, None])[:, :, 0]
-    return Update(Stack(means, (covs + np.swapaxes(covs, 1, 2)) / 2), -(logs + squares) / 2)
+    return Update(Stack(means, covs), log_likelihood)
 
 
 class Bank:
@@ -116,13 +113,7 @@ class Bank:
         are the mixture's."""
         self._share(cov)
         moved = self._model.propagate(state, cov, steps, first, ends, interval, keep=True)
-        beyond_told = self._weights.values @ self._q_scales - 1
-        phi, noise = np.eye(self._model.size), np.zeros_like(cov)
-        for node, (step, added) in enumerate(zip(moved.transitions, moved.noises, strict=True)):
-            phi = step @ phi
-            noise = symmetric(step @ noise @ step.T) + added
-            moved.covariances[node] += beyond_told * noise
-        self._stack = move_stack(self._stack, phi, noise, self._q_scales)
+        self._stack = move_stack(self._stack, moved, self._q_scales, self._weights.values)
         return moved
 
     def _share(self, cov: Floats) -> None:
