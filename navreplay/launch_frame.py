@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from navreplay.earth import EARTH_RATE, ecef_from_lla, lla_from_ecef, matrix_en, quat_en
-from navreplay.rotation import quat_conjugate, quat_from_matrix, quat_multiply
+from navreplay.rotation import matrix_from_quat, quat_conjugate, quat_from_matrix, quat_multiply
 from navreplay.timeline import Floats
 
 __all__ = ["LaunchFrame", "LaunchState", "cross_earth_rate", "earth_turn"]
@@ -46,26 +46,33 @@ class LaunchFrame:
         """(3,) the launch point from the Earth's centre [m], axes of the Earth at launch."""
         return ecef_from_lla(np.array(self.lla))
 
+    @cached_property
+    def _q_li(self) -> Floats:
+        return quat_conjugate(quat_from_matrix(self.c_il))
+
+    def c_ln(self, elapsed: Floats, lla: Floats) -> Floats:
+        """C_ln (..., 3, 3): from NED at lla (..., 3) at elapsed (...) [s] to launch axes."""
+        return matrix_from_quat(self._q_ln(elapsed, lla))
+
     def from_earth(self, elapsed: Floats, lla: Floats, vel_n: Floats, q_nb: Floats) -> LaunchState:
         """States in this frame of those on the Earth, lla, vel_n (..., 3) and q_nb (..., 4), at elapsed (...) [s]."""
-        r_e = ecef_from_lla(lla)
-        velocity_e = _turn(matrix_en(lla[..., 0], lla[..., 1]), vel_n) + cross_earth_rate(r_e)
-        c_li = self.c_il.T
-        position = (earth_turn(elapsed, r_e) - self.origin_i) @ c_li.T
-        q_eb = quat_multiply(quat_en(lla[..., 0], lla[..., 1]), q_nb)
-        q_lb = quat_multiply(quat_from_matrix(c_li), quat_multiply(_quat_ie(elapsed), q_eb))
-        return LaunchState(position, earth_turn(elapsed, velocity_e) @ c_li.T, q_lb)
+        r_i = earth_turn(elapsed, ecef_from_lla(lla))
+        q_ln = self._q_ln(elapsed, lla)
+        velocity = _turn(matrix_from_quat(q_ln), vel_n) + cross_earth_rate(r_i) @ self.c_il
+        return LaunchState((r_i - self.origin_i) @ self.c_il, velocity, quat_multiply(q_ln, q_nb))
 
     def to_earth(self, elapsed: Floats, state: LaunchState) -> tuple[Floats, Floats, Floats]:
         """lla, vel_n (..., 3) and q_nb (..., 4) of states in this frame at elapsed (...) [s]: the inverse of `from_earth`."""
-        back = -np.asarray(elapsed)
-        r_e = earth_turn(back, state.position @ self.c_il.T + self.origin_i)
-        lla = lla_from_ecef(r_e)
-        velocity_e = earth_turn(back, state.velocity @ self.c_il.T) - cross_earth_rate(r_e)
-        vel_n = _turn(np.swapaxes(matrix_en(lla[..., 0], lla[..., 1]), -1, -2), velocity_e)
-        q_ib = quat_multiply(quat_from_matrix(self.c_il), state.q_lb)
-        q_eb = quat_multiply(_quat_ie(back), q_ib)
-        return lla, vel_n, quat_multiply(quat_conjugate(quat_en(lla[..., 0], lla[..., 1])), q_eb)
+        r_i = state.position @ self.c_il.T + self.origin_i
+        lla = lla_from_ecef(earth_turn(-np.asarray(elapsed), r_i))
+        q_nl = quat_conjugate(self._q_ln(elapsed, lla))
+        vel_n = _turn(matrix_from_quat(q_nl), state.velocity - cross_earth_rate(r_i) @ self.c_il)
+        return lla, vel_n, quat_multiply(q_nl, state.q_lb)
+
+    def _q_ln(self, elapsed: Floats, lla: Floats) -> Floats:
+        """The Earth's turn only adds to the longitude."""
+        longitude = lla[..., 1] + EARTH_RATE * np.asarray(elapsed)
+        return quat_multiply(self._q_li, quat_en(lla[..., 0], longitude))
 
 
 def earth_turn(elapsed: Floats, vector_e: Floats) -> Floats:
@@ -79,12 +86,6 @@ def earth_turn(elapsed: Floats, vector_e: Floats) -> Floats:
 def cross_earth_rate(vector_e: Floats) -> Floats:
     """w_ie x vector_e (..., 3), Earth-fixed axes."""
     return EARTH_RATE * np.stack([-vector_e[..., 1], vector_e[..., 0], np.zeros_like(vector_e[..., 2])], axis=-1)
-
-
-def _quat_ie(elapsed: Floats) -> Floats:
-    half = EARTH_RATE * np.asarray(elapsed, dtype=np.float64) / 2
-    zero = np.zeros_like(half)
-    return np.stack([np.cos(half), zero, zero, np.sin(half)], axis=-1)
 
 
 def _turn(matrix: Floats, vector: Floats) -> Floats:

@@ -13,6 +13,7 @@ __all__ = [
     "GapOptions",
     "GateOptions",
     "ImuNoise",
+    "LaunchOptions",
     "MotionOptions",
     "RangeOptions",
 ]
@@ -150,6 +151,16 @@ class AttitudeOptions:
 
 
 @dataclass(frozen=True, slots=True)
+class LaunchOptions:
+    """A launch: position is latitude, longitude [rad] and height [m] of its point, azimuth [rad] that of the downrange axis,
+    clockwise from north, after [s] its time behind the first IMU sample."""
+
+    position: tuple[float, float, float]
+    azimuth: float = 0.0
+    after: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class MotionOptions:
     """Motion of a receiver without IMU. model: ``velocity`` is constant but for white acceleration of density horizontal,
     vertical [m/s^2/sqrt(Hz)]; or ``acceleration`` is, but for white jerk of these densities [m/s^3/sqrt(Hz)]."""
@@ -188,7 +199,8 @@ class FilterOptions:
     position_std_floor [m], velocity_std_floor [m/s]: least standard deviations believed.
     default_position_std, default_velocity_std: (horizontal, vertical) by name of FixStatus where the covariance is unknown.
     use: what aids the filter beside attitudes; ``auto`` takes ranges where the log has them, ``attitudes`` neither ranges nor
-    fixes. smooth: carry all measurements backward as well.
+    fixes. launch: mechanisation and errors move in the launch-inertial frame (None: in NED). smooth: carry all measurements
+    backward as well.
     """
 
     imu_noise: ImuNoise = GRADES["consumer"]
@@ -219,4 +231,5 @@ class FilterOptions:
     ranges: RangeOptions = RangeOptions()
     motion: MotionOptions = MotionOptions()
     attitude: AttitudeOptions = AttitudeOptions()
+    launch: LaunchOptions | None = None
     consider: ConsiderOptions = ConsiderOptions()

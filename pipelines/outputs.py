@@ -6,6 +6,7 @@ from pathlib import Path
 from navreplay.timeline import LogError
 from pipelines.comparison import build_comparison, comparison_figures, comparison_plots, comparison_tables
 from pipelines.estimated import estimated_toml
+from pipelines.launch_csv import write_launch_csv
 from pipelines.report import build_report, dump_json
 from pipelines.report_figures import report_plots
 from pipelines.report_html import render_html
@@ -13,7 +14,7 @@ from pipelines.report_markdown import render_markdown
 from pipelines.report_tables import headline_figures, report_tables
 from pipelines.result import RunResult
 from pipelines.solution_csv import utc_text, write_solution_csv
-from pipelines.spec import dump_toml
+from pipelines.spec import dump_toml, filter_options
 from pipelines.whole_file import write_whole
 
 __all__ = ["label_methods", "write_comparison", "write_outputs"]
@@ -21,7 +22,7 @@ __all__ = ["label_methods", "write_comparison", "write_outputs"]
 
 def write_outputs(result: RunResult, out_dir: Path) -> dict[str, Path]:
     """Writes solution.csv, report.json, report.md, report.html, config.toml, config.estimated.toml where the method estimated
-    noise from the whole log, and, unless the configuration says otherwise, recording.rrd. Returns the paths by name. Raises
+    noise from the whole log, launch.csv in the launch-inertial frame, and, unless the configuration says otherwise, recording.rrd. Returns the paths by name. Raises
     LogError when the folder cannot be written."""
     report = build_report(result)
     title, subtitle = _title(result)
@@ -35,6 +36,9 @@ def write_outputs(result: RunResult, out_dir: Path) -> dict[str, Path]:
         "report.html": lambda path: path.write_text(html, encoding="utf-8"),
         "config.toml": lambda path: path.write_text(dump_toml(result.config), encoding="utf-8"),
     }
+    launch, imu = filter_options(result.config).launch, result.used.imu
+    if launch is not None and imu is not None:
+        writers["launch.csv"] = lambda path: write_launch_csv(path, result.solution, imu, launch)
     if result.solution.estimated:
         estimated = estimated_toml(result.config, result.solution)
         writers["config.estimated.toml"] = lambda path: path.write_text(estimated, encoding="utf-8")

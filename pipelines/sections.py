@@ -10,11 +10,10 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from navreplay.options import GRADES, AlignmentOptions, AttitudeOptions, ConsiderOptions, GapOptions, GateOptions, ImuNoise
+from navreplay.options import GRADES, AlignmentOptions, ConsiderOptions, GapOptions, GateOptions, ImuNoise
 
 __all__ = [
     "AlignmentSection",
-    "AttitudeSection",
     "ConsiderSection",
     "FilterSection",
     "GapSection",
@@ -27,6 +26,7 @@ __all__ = [
     "PositionStdSection",
     "Positive",
     "Section",
+    "Vector",
 ]
 
 _DEG = pi / 180
@@ -162,18 +162,6 @@ class GateSection(Section):
         return GateOptions(self.probability, self.reset_after)
 
 
-class AttitudeSection(Section):
-    """Measured attitudes in the filter."""
-
-    use: bool = Field(True, description="let measured attitudes aid the filter; false: they serve alignment alone")
-    default_std_deg: Positive = Field(1.0, description="standard deviation where the log tells none [deg]")
-    std_floor_arcsec: Positive = Field(0.1, description="least standard deviation believed [arcsec]")
-
-    def options(self) -> AttitudeOptions:
-        """The same in radians."""
-        return AttitudeOptions(self.use, self.default_std_deg * _DEG, self.std_floor_arcsec * _DEG / 3600)
-
-
 class GapSection(Section):
     """What to do where IMU samples are missing."""
 
@@ -192,6 +180,9 @@ class FilterSection(Section):
     use: Literal["auto", "fixes", "ranges", "attitudes"] = Field(
         "auto",
         description="what aids the filter beside attitudes: fixes, ranges (auto: where the log has them) or nothing else",
+    )
+    frame: Literal["ned", "launch-inertial"] = Field(
+        "ned", description="frame in which motion and errors move; launch-inertial: see [launch]"
     )
     parameters: Mapping[str, object] = Field(default_factory=dict, description="parameters of the method, by name")
     covariance_interval_s: Positive = Field(0.05, description="longest step of the covariance propagation [s]")

@@ -18,10 +18,10 @@ from pydantic_core import ErrorDetails
 from importers.settings import InputSettings
 from navreplay.options import FilterOptions
 from navreplay.timeline import LogError
+from pipelines.flight_sections import AttitudeSection, LaunchSection
 from pipelines.range_sections import MotionSection, RangeSection
 from pipelines.sections import (
     AlignmentSection,
-    AttitudeSection,
     ConsiderSection,
     FilterSection,
     GapSection,
@@ -50,6 +50,7 @@ class Config(Section):
     consider: ConsiderSection = ConsiderSection()
     gnss: GnssSection = GnssSection()
     attitude: AttitudeSection = AttitudeSection()
+    launch: LaunchSection = LaunchSection()
     range: RangeSection = RangeSection()
     motion: MotionSection = MotionSection()
     output: OutputSection = OutputSection()
@@ -76,6 +77,7 @@ def filter_options(config: Config) -> FilterOptions:
         default_velocity_std=config.gnss.default_velocity_std_mps,
         use=config.filter.use,
         attitude=config.attitude.options(),
+        launch=None if config.filter.frame == "ned" else config.launch.options(config.alignment.position_deg_m),
         ranges=config.range.options(),
         motion=config.motion.options(),
         consider=config.consider.options(),

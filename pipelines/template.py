@@ -35,6 +35,7 @@ _EXAMPLES = {
     "gyro_markov_tau_s": 300.0,
     "given_deg": [0.0, 0.0, 90.0],
     "position_deg_m": [40.0, 116.3, 50.0],
+    "point_deg_m": [40.0, 116.3, 50.0],
     "sigma_arcsec": [1.0, 1.0, 5.0],
     "output_point_m": [1.2, 0.0, 0.8],
     "fix_interval_s": 1.0,

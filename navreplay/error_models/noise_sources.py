@@ -27,7 +27,7 @@ def without_sources(model: ErrorModel) -> dict[str, ErrorModel]:
 def _without(model: ErrorModel) -> Mapping[str, MotionModel]:
     if isinstance(model, NedErrorModel):
         noise = model.noise
-        return {s: NedErrorModel(replace(noise, **{s: 0.0})) for s in IMU_SOURCES if getattr(noise, s) > 0}
+        return {s: replace(model, noise=replace(noise, **{s: 0.0})) for s in IMU_SOURCES if getattr(noise, s) > 0}
     if isinstance(model, FreeMotionModel):
         options = model.options
         silent = {"horizontal": replace(options, horizontal=0.0), "vertical": replace(options, vertical=0.0)}

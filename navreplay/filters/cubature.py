@@ -18,6 +18,7 @@ import numpy as np
 from navreplay.error_models.clocked import ClockedModel
 from navreplay.error_models.considered import ConsideredModel
 from navreplay.error_models.error_model import ErrorModel, MotionModel
+from navreplay.error_models.launch_inertial import LaunchInertialModel
 from navreplay.error_models.ned import NedErrorModel, Propagated
 from navreplay.error_models.pointwise import PointwiseModel
 from navreplay.filters.moments import Linearised
@@ -62,4 +63,6 @@ class Cubature(Linearised):
         return self._motion_by_points(model) if isinstance(model, NedErrorModel) else model
 
     def _motion_by_points(self, motion: MotionModel) -> MotionModel:
+        if isinstance(motion, LaunchInertialModel):
+            raise LogError("filter: cubature points move in NED; choose filter.frame = 'ned', or a method without cubature")
         return PointwiseModel(motion.noise, self.attitude_states) if isinstance(motion, NedErrorModel) else motion

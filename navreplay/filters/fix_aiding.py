@@ -21,9 +21,9 @@ class FixAiding:
 
     name = "fixes"
 
-    def __init__(self, fixes: GnssFixSeries, lever_b: Floats, options: FilterOptions) -> None:
+    def __init__(self, fixes: GnssFixSeries, lever_b: Floats, options: FilterOptions, model: NedErrorModel) -> None:
         self.fixes = fixes
-        self.model = NedErrorModel(options.imu_noise)
+        self.model = model
         self._noise = fix_noise(fixes, options)
         self._lever_b = lever_b
         self._has_position = fixes.has_position

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from navreplay.alignment import align
 from navreplay.error_models.error_model import ErrorModel
+from navreplay.error_models.launch_inertial import inertial_model
 from navreplay.error_models.ned import NedErrorModel
 from navreplay.filters.attitude_aiding import AttitudeAiding, JointAiding, JointGate
 from navreplay.filters.fix_aiding import FixAiding
@@ -24,10 +25,11 @@ __all__ = ["Guidance", "choose_guidance"]
 @dataclass(frozen=True, eq=False, slots=True)
 class Guidance:
     """main: what a filter starts from and what decides its error model. aiding: main, joined by attitudes where there are any
-    beside it."""
+    beside it. inertial: error model of the IMU."""
 
     main: FixAiding | RangeAiding | AttitudeAiding
     aiding: Aiding
+    inertial: NedErrorModel
 
     @property
     def model(self) -> ErrorModel:
@@ -44,7 +46,7 @@ class Guidance:
     ) -> tuple[int, NavState, Floats]:
         """Time, state and covariance (n, n) at which a stretch of the IMU starts; the record tells how. Raises LogError."""
         if isinstance(self.main, AttitudeAiding):
-            told = start_as_told(timeline, imu, NedErrorModel(options.imu_noise), options)
+            told = start_as_told(timeline, imu, self.inertial, options)
             recorder.tell(told.t_ns, "info", told.text)
             return told.t_ns, told.state, told.cov
         sources = Sources(imu, self.main.fixes, timeline.attitude, timeline.reference, options.imu_noise, options.alignment)
@@ -57,20 +59,23 @@ class Guidance:
 
 def choose_guidance(timeline: Timeline, options: FilterOptions, recorder: Recorder) -> Guidance:
     """What the options take of a timeline with IMU. Raises LogError where the log does not hold it."""
+    if timeline.imu is None:
+        raise LogError("filter: attitudes and fixes aid an IMU, but the log holds none")
+    model = inertial_model(options, int(timeline.imu.t_ns[0]))
     main: FixAiding | RangeAiding | None = None
     if timeline.ranges is not None and options.use in ("auto", "ranges"):
-        main = RangeAiding(timeline.ranges, timeline.fix_lever_b, True, options, recorder)
+        main = RangeAiding(timeline.ranges, timeline.fix_lever_b, model, options, recorder)
     elif timeline.fixes is not None and options.use in ("auto", "fixes"):
-        main = FixAiding(timeline.fixes, timeline.fix_lever_b, options)
+        main = FixAiding(timeline.fixes, timeline.fix_lever_b, options, model)
     attitude = timeline.attitude if options.attitude.use else None
     if main is None:
         if attitude is None or options.use not in ("auto", "attitudes"):
             raise _nothing_to_use(options)
-        alone = AttitudeAiding(attitude, NedErrorModel(options.imu_noise), options.attitude)
-        return Guidance(alone, alone)
+        alone = AttitudeAiding(attitude, model, options.attitude)
+        return Guidance(alone, alone, model)
     if attitude is None:
-        return Guidance(main, main)
-    return Guidance(main, JointAiding(main, AttitudeAiding(attitude, main.model, options.attitude)))
+        return Guidance(main, main, model)
+    return Guidance(main, JointAiding(main, AttitudeAiding(attitude, main.model, options.attitude)), model)
 
 
 def _nothing_to_use(options: FilterOptions) -> LogError:

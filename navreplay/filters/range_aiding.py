@@ -31,14 +31,21 @@ _DOUBT = 100.0
 
 
 class RangeAiding:
-    """Ranges of one receiver, carried by an IMU (has_imu) or moving freely.
+    """Ranges of one receiver, carried by an IMU (with that error model) or moving freely (None).
 
     fixes: least-squares positions of the epochs that are trusted with it, from which a filter is aligned and started.
     """
 
     name = "ranges"
 
-    def __init__(self, ranges: RangeSeries, lever_b: Floats, has_imu: bool, options: FilterOptions, recorder: Recorder) -> None:
+    def __init__(
+        self,
+        ranges: RangeSeries,
+        lever_b: Floats,
+        inertial: NedErrorModel | None,
+        options: FilterOptions,
+        recorder: Recorder,
+    ) -> None:
         self._points, self._epochs, left_out = solve_points(ranges, options.ranges)
         self.fixes = fixes_of(self._points)
         self._lever_b = lever_b
@@ -46,10 +53,9 @@ class RangeAiding:
         self._recorder = recorder
         sats = tuple(np.unique(self._epochs.sat).tolist()) if options.ranges.multipath_share > 0 else ()
         clock = ReceiverClock(self._points.groups, options.ranges, sats)
-        self._inertial = NedErrorModel(options.imu_noise)
+        self._inertial = inertial
         self._free = FreeMotionModel(options.motion)
-        self.model = ClockedModel(self._inertial if has_imu else self._free, clock)
-        self._has_imu = has_imu
+        self.model = ClockedModel(self._free if inertial is None else inertial, clock)
         self._scale = options.noise_scale**2
         self._drift = len(clock.groups)
         self._noise = self._share_noise(sats)
@@ -72,7 +78,8 @@ class RangeAiding:
         return self._epochs.t_ns
 
     def start(self, alignment: Alignment) -> tuple[NavState, Floats]:
-        """State and covariance (n, n) of the IMU at the alignment's epoch."""
+        """State and covariance (n, n) of the IMU at the alignment's epoch. Only where an IMU carries the receiver."""
+        assert self._inertial is not None
         noise = fix_noise(self.fixes, self._options)
         state, cov = start_at_fix(self._inertial, self.fixes, noise, alignment, self._lever_b)
         return self._with_clock(alignment.fix, state, cov)
@@ -128,7 +135,7 @@ class RangeAiding:
         if rows.start == rows.stop:
             return Observed(None, state, cov)
         n = self.model.motion.size
-        if self._has_imu:
+        if self._inertial is not None:
             antenna = carried_antenna(state, self._lever_b, angular_rate(state, dtheta, dt), n)
         else:
             antenna = free_antenna(state, n)

@@ -105,7 +105,7 @@ def _choose_ranges_alone(timeline: Timeline, options: FilterOptions, recorder: R
         "its roll and pitch are unknown"
     )
     recorder.tell(int(timeline.ranges.t_ns[0]), "warning", text)
-    return RangeAiding(timeline.ranges, timeline.fix_lever_b, False, options, recorder)
+    return RangeAiding(timeline.ranges, timeline.fix_lever_b, None, options, recorder)
 
 
 def _join(rows: list[Rows], method: str, model: ErrorModel, recorder: Recorder) -> Solution:
