@@ -22,8 +22,8 @@ __all__ = ["label_methods", "write_comparison", "write_outputs"]
 
 def write_outputs(result: RunResult, out_dir: Path) -> dict[str, Path]:
     """Writes solution.csv, report.json, report.md, report.html, config.toml, config.estimated.toml where the method estimated
-    noise from the whole log, launch.csv in the launch-inertial frame, and, unless the configuration says otherwise, recording.rrd. Returns the paths by name. Raises
-    LogError when the folder cannot be written."""
+    noise from the whole log, launch.csv in the launch-inertial frame, and, unless the configuration says otherwise,
+    recording.rrd. Returns the paths by name. Raises LogError when the folder cannot be written."""
     report = build_report(result)
     title, subtitle = _title(result)
     figures, tables = headline_figures(report), report_tables(report)

@@ -18,6 +18,8 @@ from navreplay.options import AlignmentOptions, FilterOptions, GateOptions, ImuN
 from navreplay.rotation import euler_from_quat, quat_conjugate, quat_from_rotvec, quat_multiply, rotvec_from_quat
 from navreplay.strapdown import NavState, make_steps
 from navreplay.timeline import LogError
+from pipelines.launch_csv import LAUNCH_COLUMNS, write_launch_csv
+from pipelines.spec import Config, filter_options
 from synthetic_logs import SCENARIOS, ideal_imu, simulate, truth_at, with_duration
 
 ARCSEC = pi / 180 / 3600
@@ -157,3 +159,26 @@ def test_what_the_launch_frame_cannot_hold_is_one_clear_line():
     log = simulate(with_duration(SCENARIO, 10.0), 7)
     with pytest.raises(LogError, match="cubature points move in NED"):
         run_filter(log.timeline(), build_method("ckf"), told(log, LaunchOptions(FLIGHT.lla)))
+
+
+def test_launch_csv_tells_the_flight_in_launch_axes(tmp_path):
+    log = simulate(with_duration(SCENARIO, 30.0), 7)
+    solution = run_filter(log.timeline(), build_method("fixed"), told(log, None))
+    path = tmp_path / "launch.csv"
+    write_launch_csv(path, solution, log.imu, LaunchOptions(FLIGHT.lla, FLIGHT.azimuth))
+    table = np.genfromtxt(path, delimiter=",", names=True)
+    assert list(table.dtype.names) == list(LAUNCH_COLUMNS)
+    assert len(table) == len(solution)
+    height = table["y_m"][-1]
+    assert height == pytest.approx(log.truth.lla[-1, 2], rel=0.01)
+    assert 0.1 < table["std_phi_x_arcsec"][-1] < 0.5
+
+
+def test_the_configuration_chooses_the_frame():
+    ned = filter_options(Config())
+    assert ned.launch is None
+    settings = {"filter": {"frame": "launch-inertial"}, "alignment": {"position_deg_m": [40.0, 116.0, 5.0]}}
+    launch = filter_options(Config.model_validate(settings)).launch
+    np.testing.assert_allclose(launch.position, [np.radians(40.0), np.radians(116.0), 5.0])
+    with pytest.raises(LogError, match=r"launch\.point_deg_m"):
+        filter_options(Config.model_validate({"filter": {"frame": "launch-inertial"}}))
