@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from navreplay.adapt.autoregression import akaike_order, autocorrelation, burg, explained_share
 from navreplay.adapt.eiakf import corrected_variance
 from navreplay.adapt.ermakf import correlated_variance
-from navreplay.adapt.ermakf_derived import fit_correlation, lag_variances
+from navreplay.adapt.ermakf_derived import fit_correlation, fit_levels, lag_variances, share_time_constants
 from navreplay.adapt.kernel_density import is_credible, kernel_density, silverman_bandwidth
 from navreplay.adapt.random_weights import random_weights
 from navreplay.adapt.trails import remove_common
@@ -128,6 +128,26 @@ def test_derived_variance_is_of_the_right_size(tau, low, high):
     count = np.full(4000, 60.0)
     variance, _ = fit_correlation(lag_variances(differences, count, 20), np.full(4000, 20.0))
     assert low < variance.mean() < high
+
+
+@pytest.mark.parametrize(("tau", "low", "high"), [(0, 0.9, 1.05), (5, 0.85, 1.15), (20, 0.85, 1.3), (60, 0.5, 1.0)])
+def test_a_shared_time_constant_takes_much_of_the_bias_out(tau, low, high):
+    """Ten components at a time share T: the mean of s^2 is nearly right, and single ones scatter less than with their own T."""
+    variances = lag_variances(np.diff(gauss_markov(tau, 4000, 61, seed=10), axis=1), np.full(4000, 60.0), 20)
+    longest = np.full(4000, 20.0)
+    kinds = tuple(f"kind {i // 10}" for i in range(4000))
+    levels = fit_levels(variances, longest, share_time_constants(variances, longest, kinds))
+    assert low < levels.mean() < high
+    alone, _ = fit_correlation(variances, longest)
+    assert levels.std() < alone.std()
+
+
+def test_kinds_keep_their_own_time_constant():
+    lag = np.arange(1, 21)
+    exact = np.array([3 * (1 - np.exp(-lag / 5)), 7 * (1 - np.exp(-lag / 20)), 5 * (1 - np.exp(-lag / 5))])
+    shared = share_time_constants(exact, np.full(3, 20.0), ("range", "range_rate", "range"))
+    assert shared == pytest.approx([5, 20, 5])
+    assert fit_levels(exact, np.full(3, 20.0), shared) == pytest.approx([3, 7, 5])
 
 
 def test_lag_variances_equal_their_definition():
