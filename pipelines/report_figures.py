@@ -9,6 +9,7 @@ from navreplay.metrics import Evaluation
 from navreplay.rotation import euler_from_quat
 from navreplay.solution import InnovationSeries, Solution
 from navreplay.timeline import FixStatus, Floats, Timeline
+from pipelines.angles import suit_errors, suit_innovations
 from pipelines.plot import Legend, Plot, bend_of, elapsed_s, time_plot
 from pipelines.report import outage_errors
 from pipelines.result import RunResult
@@ -124,9 +125,9 @@ def _plot_motion(result: RunResult, shades: Sequence[tuple[float, float]], drawi
 def _plot_errors(evaluation: Evaluation, solution: Solution, shades: Sequence[tuple[float, float]]) -> list[Plot]:
     plots = []
     t = elapsed_s(evaluation.t_ns, solution)
-    for quantity, series in evaluation.errors.items():
-        factor, unit = (np.degrees(1.0), "deg") if series.unit == "rad" else (1.0, series.unit)
-        error, envelope = series.error * factor, 3 * series.std * factor
+    for quantity, measured in evaluation.errors.items():
+        series = suit_errors(measured)
+        error, envelope, unit = series.error, 3 * series.std, series.unit
         bend = bend_of(error, envelope)
         panels = [
             Panel(
@@ -170,7 +171,7 @@ def _plot_attitude(solution: Solution, shades: Sequence[tuple[float, float]]) ->
 
 
 def _plot_innovations(series: InnovationSeries, solution: Solution, shades: Sequence[tuple[float, float]]) -> Plot:
-    t = elapsed_s(series.t_ns, solution)
+    t, series = elapsed_s(series.t_ns, solution), suit_innovations(series)
     used, refused = series.used, ~series.used
     panels = []
     for i, label in enumerate(series.labels):
@@ -192,7 +193,7 @@ def _plot_innovations(series: InnovationSeries, solution: Solution, shades: Sequ
 
 
 def _plot_noise(series: InnovationSeries, solution: Solution, shades: Sequence[tuple[float, float]]) -> Plot:
-    t = elapsed_s(series.t_ns, solution)
+    t, series = elapsed_s(series.t_ns, solution), suit_innovations(series)
     panels = [
         Panel(
             f"{label} [{series.unit}]",

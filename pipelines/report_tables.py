@@ -1,8 +1,10 @@
 """The tables of a report, taken from its plain data; Markdown and HTML only set them."""
 
 from collections.abc import Mapping, Sequence
+from math import inf
 from typing import Any
 
+from pipelines.angles import suit_unit
 from pipelines.report import Report
 from pipelines.satellite_tables import satellite_figure, satellite_tables
 from pipelines.table import Figure, Table, figure_text
@@ -33,9 +35,7 @@ def headline_figures(report: Report) -> tuple[Figure, ...]:
             figures.append(Figure(f"{name} RMS", figure_text(position[component]["rms"], "m"), f"{words}; 95 % {p95}"))
     figures += _outage_figures(report["outages"])
     if errors is not None and "attitude" in errors["all"]:
-        figures.append(
-            Figure("Heading error RMS", figure_text(errors["all"]["attitude"]["heading"]["rms"], "deg"), "whole drive")
-        )
+        figures.append(_attitude_figure(errors["all"]))
     if report["nees"] is not None:
         nees = report["nees"]["position"]
         inside = f"3 expected; {_percent(nees['share_below_upper'])} below the 97.5 % bound"
@@ -48,6 +48,17 @@ def headline_figures(report: Report) -> tuple[Figure, ...]:
         kinds = "; ".join(f"{kind} {used} of {read}" for kind, used, read in counts)
         figures.append(Figure("Measurements used", f"{100 * used / max(read, 1):.4g} %", kinds))
     return tuple(figures)
+
+
+def _attitude_figure(errors: Mapping[str, Any]) -> Figure:
+    """Heading or, where attitudes were measured against the stars, the worst axis against these."""
+    name, table, axes = "Heading error RMS", errors["attitude"], ("heading",)
+    if "inertial_attitude" in errors:
+        name, table, axes = "Attitude error RMS", errors["inertial_attitude"], ("north", "east", "heading")
+    rms = max((table[axis]["rms"] for axis in axes if table[axis]["count"]), default=None)
+    factor, unit = suit_unit("deg", inf if rms is None else rms)
+    context = "whole drive" if len(axes) == 1 else "whole drive, worst axis, against Earth-fixed axes"
+    return Figure(name, figure_text(None if rms is None else rms * factor, unit), context)
 
 
 def _outage_figures(outages: Mapping[str, Any]) -> list[Figure]:
@@ -91,12 +102,15 @@ def _error_tables(errors: Mapping[str, Any]) -> list[Table]:
     tables = []
     for quantity, first in errors["all"].items():
         rows = []
+        middles = [figures["p50"] for component, figures in first.items() if component != "unit" and figures["count"]]
+        factor, unit = suit_unit(first["unit"], max(middles, default=inf))
         for stretch, words in _STRETCHES.items():
             table = errors[stretch][quantity]
             for component, figures in table.items():
                 if component != "unit" and figures["count"]:
-                    rows.append((words, component.replace("3d", "3-D"), *(figure_text(figures[name]) for name in _STATISTICS)))
-        title = f"{quantity.capitalize()} error [{first['unit']}]"
+                    shown = (figure_text(figures[name] * (1 if name == "count" else factor)) for name in _STATISTICS)
+                    rows.append((words, component.replace("3d", "3-D"), *shown))
+        title = f"{quantity.replace('_', ' ').capitalize()} error [{unit}]"
         tables.append(
             Table(
                 title, ("", "component", *_STATISTICS), tuple(rows), "Estimated minus reference; percentiles of the magnitude."
@@ -161,12 +175,14 @@ def _innovation_table(innovations: Mapping[str, Any]) -> Table:
     rows = []
     for kind, series in innovations.items():
         for label, component in series["components"].items():
+            rms, mean = component["residual"]["rms"], component["residual"]["mean"]
+            factor, unit = suit_unit(series["unit"], rms if rms is not None else inf)
             rows.append(
                 (
                     kind,
                     label,
-                    figure_text(component["residual"]["rms"], series["unit"]),
-                    figure_text(component["residual"]["mean"], series["unit"]),
+                    figure_text(None if rms is None else rms * factor, unit),
+                    figure_text(None if mean is None else mean * factor, unit),
                     figure_text(component["normalised"]["rms"]),
                     figure_text(component["noise_over_nominal"]["p50"]),
                     f"{series['used']} of {series['read']}",

@@ -4,6 +4,7 @@ import numpy as np
 import rerun as rr
 
 from navreplay.solution import InnovationSeries, Solution
+from pipelines.angles import suit_errors, suit_innovations
 from pipelines.rerun_layout import Stack
 from pipelines.rerun_paint import BLUE, GREEN, GREY, ORANGE, PALE, RED, send_dots, send_line, time_columns
 from pipelines.rerun_sky import send_satellite_innovations, send_shared_noise
@@ -21,17 +22,17 @@ def list_stacks(result: RunResult) -> tuple[Stack, ...]:
     stacks = []
     if result.evaluation is not None:
         for quantity, series in result.evaluation.errors.items():
-            unit = "deg" if series.unit == "rad" else series.unit
-            stacks.append(Stack(f"{quantity.capitalize()} error", f"/errors/{quantity}", series.labels, unit))
+            name, unit = quantity.replace("_", " ").capitalize(), suit_errors(series).unit
+            stacks.append(Stack(f"{name} error", f"/errors/{quantity}", series.labels, unit))
     else:
         stacks.append(Stack("Position sigma", "/sigma/position", ("north", "east", "down"), "m"))
     if result.sky is not None:
         stacks.append(Stack("Satellites", "/satellites", ("number", "dilution"), ""))
     for innovations in result.solution.innovations:
         kind = innovations.kind
-        labels = () if innovations.sources else innovations.labels
-        stacks.append(Stack(f"Innovations: {kind}", f"/innovations/{kind}", labels, innovations.unit))
-        stacks.append(Stack(f"Noise: {kind}", f"/noise/{kind}", labels, innovations.unit))
+        labels, unit = () if innovations.sources else innovations.labels, suit_innovations(innovations).unit
+        stacks.append(Stack(f"Innovations: {kind}", f"/innovations/{kind}", labels, unit))
+        stacks.append(Stack(f"Noise: {kind}", f"/noise/{kind}", labels, unit))
     if result.solution.weights is not None:
         stacks.append(Stack("Weights", "/weights", ("bank",), "1"))
     stacks.append(Stack("Gyro bias", "/bias/gyro", ("x", "y", "z"), "deg/h"))
@@ -48,13 +49,13 @@ def send_errors(recording: rr.RecordingStream, result: RunResult) -> None:
             send_line(recording, f"/sigma/position/{label}/sigma", times, solution.std[:, i], "sigma", BLUE)
         return
     times = time_columns(evaluation.t_ns, solution)
-    for quantity, series in evaluation.errors.items():
-        factor = np.degrees(1.0) if series.unit == "rad" else 1.0
+    for quantity, measured in evaluation.errors.items():
+        series = suit_errors(measured)
         for i, label in enumerate(series.labels):
-            path, envelope = f"/errors/{quantity}/{label}", 3 * series.std[:, i] * factor
+            path, envelope = f"/errors/{quantity}/{label}", 3 * series.std[:, i]
             send_line(recording, f"{path}/upper", times, envelope, "+3 sigma", PALE)
             send_line(recording, f"{path}/lower", times, -envelope, "-3 sigma", PALE)
-            send_line(recording, f"{path}/error", times, series.error[:, i] * factor, "error", BLUE)
+            send_line(recording, f"{path}/error", times, series.error[:, i], "error", BLUE)
 
 
 def send_innovations(recording: rr.RecordingStream, solution: Solution) -> None:
@@ -64,7 +65,7 @@ def send_innovations(recording: rr.RecordingStream, solution: Solution) -> None:
             send_satellite_innovations(recording, series, solution)
             send_shared_noise(recording, series, solution)
         else:
-            _send_components(recording, series, solution)
+            _send_components(recording, suit_innovations(series), solution)
 
 
 def _send_components(recording: rr.RecordingStream, series: InnovationSeries, solution: Solution) -> None:
