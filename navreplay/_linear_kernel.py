@@ -40,7 +40,8 @@ def filter_forward(  # type: ignore[no-untyped-def]
             total -= math.log(factor[i, i])
         gain = cross @ weight
         mean = mean + gain @ nu
-        cov = cov - gain @ cross.T
+        keep = np.eye(n) - gain @ h
+        cov = keep @ cov @ keep.T + gain @ noise[k, :m, :m].copy() @ gain.T
         innovation[first:last] = nu
         weights[k, :m, :m] = weight
         gains[k, :, :m] = gain

@@ -9,6 +9,7 @@ __all__ = [
     "AlignmentOptions",
     "AttitudeOptions",
     "ConsiderOptions",
+    "CorrelatedNoise",
     "FilterOptions",
     "GapOptions",
     "GateOptions",
@@ -190,17 +191,27 @@ class ConsiderOptions:
 
 
 @dataclass(frozen=True, slots=True)
+class CorrelatedNoise:
+    """A first-order Gauss-Markov error of the positions or velocities of fixes. std: horizontal, vertical [m] or [m/s]. time:
+    of correlation [s]."""
+
+    kind: Literal["position", "velocity"]
+    std: tuple[float, float]
+    time: float
+
+
+@dataclass(frozen=True, slots=True)
 class FilterOptions:
     """Everything a filter run is told beside the timeline and the method.
 
     output_rate [Hz] of rows between GNSS epochs (0: only at GNSS epochs). covariance_interval [s]: longest step of the
     covariance propagation. use_velocity: take GNSS velocity where the log has it. noise_scale multiplies the standard
-    deviations of all GNSS measurements, position_noise_scale and velocity_noise_scale those of fixes besides.
-    position_std_floor [m], velocity_std_floor [m/s]: least standard deviations believed.
-    default_position_std, default_velocity_std: (horizontal, vertical) by name of FixStatus where the covariance is unknown.
-    use: what aids the filter beside attitudes; ``auto`` takes ranges where the log has them, ``attitudes`` neither ranges nor
-    fixes. launch: mechanisation and errors move in the launch-inertial frame (None: in NED). smooth: carry all measurements
-    backward as well.
+    deviations of all GNSS measurements, position_noise_scale and velocity_noise_scale those of fixes besides. correlated_noise:
+    errors of fixes beside the told ones that stay; they are estimated (three states more each). position_std_floor [m],
+    velocity_std_floor [m/s]: least standard deviations believed. default_position_std, default_velocity_std: (horizontal,
+    vertical) by name of FixStatus where the covariance is unknown. use: what aids the filter beside attitudes; ``auto`` takes
+    ranges where the log has them, ``attitudes`` neither ranges nor fixes. launch: mechanisation and errors move in the
+    launch-inertial frame (None: in NED). smooth: carry all measurements backward as well.
     """
 
     imu_noise: ImuNoise = GRADES["consumer"]
@@ -211,6 +222,7 @@ class FilterOptions:
     covariance_interval: float = 0.05
     use_velocity: bool = True
     noise_scale: float = 1.0
+    correlated_noise: tuple[CorrelatedNoise, ...] = ()
     position_noise_scale: float = 1.0
     velocity_noise_scale: float = 1.0
     position_std_floor: float = 0.01

@@ -102,7 +102,7 @@ class Solution:
     innovations: tuple[InnovationSeries, ...] = ()
     events: tuple[Event, ...] = ()
     outages: tuple[Outage, ...] = ()
-    estimated: Mapping[str, float] = field(default_factory=dict)
+    estimated: Mapping[str, float | tuple[float, float]] = field(default_factory=dict)
     weights: WeightSeries | None = None
 
     def __len__(self) -> int:

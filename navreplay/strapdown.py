@@ -49,7 +49,7 @@ class NavState:
     """Position (3,) [rad, rad, m], velocity NED (3,) [m/s], attitude q_nb (4,), gyro bias (3,) [rad/s], accelerometer bias
     (3,) [m/s^2], scale-factor errors (3,) of gyro and accelerometer [1], Gauss-Markov part of the gyro error (3,) [rad/s],
     which adds to the gyro bias; acceleration NED (3,) [m/s^2] where no IMU measures it; and, where ranges are used, the
-    receiver clock (c,): offsets [m] and, last, drift [m/s]."""
+    receiver clock (c,): offsets [m] and, last, drift [m/s], or in its place the correlated error of fixes (3,) NED [m]."""
 
     lla: Floats
     vel_n: Floats

@@ -10,7 +10,15 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from navreplay.options import GRADES, AlignmentOptions, ConsiderOptions, GapOptions, GateOptions, ImuNoise
+from navreplay.options import (
+    GRADES,
+    AlignmentOptions,
+    ConsiderOptions,
+    CorrelatedNoise,
+    GapOptions,
+    GateOptions,
+    ImuNoise,
+)
 
 __all__ = [
     "AlignmentSection",
@@ -239,6 +247,13 @@ class GnssSection(Section):
     noise_scale: Positive = Field(1.0, description="multiplies the standard deviations of all GNSS measurements")
     position_noise_scale: Positive = Field(1.0, description="those of positions besides")
     velocity_noise_scale: Positive = Field(1.0, description="those of velocities besides")
+    correlated_position_std_m: tuple[NotNegative, NotNegative] = Field(
+        (0.0, 0.0),
+        description="position errors that stay, beside those told: [horizontal, vertical]; above 0 they are estimated [m]",
+    )
+    position_correlation_time_s: Positive = Field(30.0, description="how long they stay: time of correlation [s]")
+    correlated_velocity_std_mps: tuple[NotNegative, NotNegative] = Field((0.0, 0.0), description="the same of velocities [m/s]")
+    velocity_correlation_time_s: Positive = Field(3.0, description="how long those stay [s]")
     position_std_floor_m: NotNegative = Field(0.01, description="least standard deviation of a position believed [m]")
     velocity_std_floor_mps: NotNegative = Field(0.02, description="least standard deviation of a velocity believed [m/s]")
     default_position_std_m: PositionStdSection = Field(
@@ -247,6 +262,12 @@ class GnssSection(Section):
     default_velocity_std_mps: Pair = Field(
         (0.1, 0.2), description="where the covariance is unknown: [horizontal, vertical] [m/s]"
     )
+
+    def correlated_noise(self) -> tuple[CorrelatedNoise, ...]:
+        """The errors that stay and are not zero."""
+        position = CorrelatedNoise("position", self.correlated_position_std_m, self.position_correlation_time_s)
+        velocity = CorrelatedNoise("velocity", self.correlated_velocity_std_mps, self.velocity_correlation_time_s)
+        return tuple(noise for noise in (position, velocity) if any(noise.std))
 
 
 class OutputSection(Section):

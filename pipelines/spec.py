@@ -69,6 +69,7 @@ def filter_options(config: Config) -> FilterOptions:
         use_velocity=config.filter.use_velocity,
         smooth=config.filter.smooth,
         noise_scale=config.gnss.noise_scale,
+        correlated_noise=config.gnss.correlated_noise(),
         position_noise_scale=config.gnss.position_noise_scale,
         velocity_noise_scale=config.gnss.velocity_noise_scale,
         position_std_floor=config.gnss.position_std_floor_m,

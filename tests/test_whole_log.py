@@ -1,20 +1,23 @@
 """Noise estimated from the whole log: the linear problem behind it, and expectation maximisation on it."""
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
 import synthetic_logs
-from navreplay import _linear_kernel
+from navreplay import _chain_kernel, _linear_kernel, earth
 from navreplay.adapt.em_offline import improve_factors, maximise_likelihood
 from navreplay.adapt.fixed import Fixed
-from navreplay.filters.linear_log import LinearLog, adjoin, log_likelihood, process_noise, scale_rows
+from navreplay.adapt.noise_levels import Chain, find_levels, ratios_of
+from navreplay.filters.linear_log import LinearLog, adjoin, delete, log_likelihood, process_noise, scale_rows
 from navreplay.filters.presets import build_method
 from navreplay.filters.run import run_filter
-from navreplay.options import FilterOptions
+from navreplay.options import FilterOptions, GateOptions
 from navreplay.timeline import LogError, Timeline
 
 TRANSITION = np.array([[1.0, 1.0], [0.0, 0.9]])
@@ -42,8 +45,9 @@ def draw_log(seed: int, count: int, true: Mapping[str, float]) -> LinearLog:
         size = starts[k + 1] - starts[k]
         told[k, :size, :size] = np.eye(size)
     return LinearLog(
-        t_ns=np.arange(count, dtype=np.int64) * 10**9,
+        start_ns=0,
         start=START,
+        t_ns=np.arange(1, count + 1, dtype=np.int64) * 10**9,
         transitions=np.tile(TRANSITION, (count, 1, 1)),
         rest=np.zeros((count, 2, 2)),
         sources={"push": np.tile(PROCESS, (count, 1, 1))},
@@ -164,7 +168,7 @@ def test_a_trace_has_the_likelihood_of_the_pass(log):
 
     class Watch:
         def settle(self, options, trace):
-            traced.extend(trace(options, Fixed()))
+            traced.extend(trace(options, Fixed(), ("gyro_noise",)))
             return build_method("em-offline").calibration.settle(options, trace)
 
     options = FilterOptions(imu_noise=SCENARIO.imu.noise)
@@ -226,3 +230,113 @@ def test_a_log_without_measurements_is_told(log):
     )  # fmt: skip
     with pytest.raises(LogError):
         run_filter(replace(only, fixes=one), build_method("em-offline"), FilterOptions(imu_noise=SCENARIO.imu.noise))
+
+
+def draw_chain(seed: int, ratio: np.ndarray, spread: float = 0.3) -> Chain:
+    """Three components per epoch, whose noise has the told variance times ratio (k,)."""
+    rng = np.random.default_rng(seed)
+    residual = np.sqrt(ratio[:, None] + spread) * rng.normal(size=(len(ratio), 3))
+    return Chain(residual, np.full((len(ratio), 3), spread))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_told_noise_is_kept_where_it_is_right(seed):
+    chain = draw_chain(seed, np.ones(400))
+    np.testing.assert_array_equal(ratios_of(chain, find_levels([chain])), 1)
+
+
+def test_a_scale_a_step_and_a_mixture_are_found():
+    scale = draw_chain(1, np.full(400, 9.0))
+    np.testing.assert_allclose(ratios_of(scale, find_levels([scale])), 9, rtol=0.15)
+    true = np.where((np.arange(600) >= 200) & (np.arange(600) < 400), 16.0, 1.0)
+    step = draw_chain(2, true)
+    found = ratios_of(step, find_levels([step]))
+    assert (np.abs(np.log(found / true)) < 0.3).mean() > 0.98
+    wide = np.random.default_rng(3).random(600) < 0.2
+    mixture = draw_chain(4, np.where(wide, 64.0, 1.0))
+    found = ratios_of(mixture, find_levels([mixture]))
+    assert ((found > 8) == wide).mean() > 0.97
+
+
+def test_few_epochs_are_taken_as_told():
+    chain = draw_chain(1, np.full(15, 100.0))
+    np.testing.assert_array_equal(ratios_of(chain, find_levels([chain])), 1)
+
+
+def test_compiled_chain_equals_its_source_and_sums_over_all_paths():
+    rng = np.random.default_rng(5)
+    first, move, density = np.array([0.7, 0.3]), np.array([[0.9, 0.1], [0.4, 0.6]]), rng.normal(size=(5, 2)) * 3
+    posterior, moves = np.empty((5, 2)), np.zeros((2, 2))
+    value = _chain_kernel.pass_chain.py_func(first, move, density, posterior, moves)
+    expected, shares, steps = 0.0, np.zeros((5, 2)), np.zeros((2, 2))
+    for path in itertools.product(range(2), repeat=5):
+        weight = first[path[0]] * np.exp(density[range(5), path].sum()) * np.prod([move[a, b] for a, b in pairwise(path)])
+        expected += weight
+        shares[range(5), path] += weight
+        for a, b in pairwise(path):
+            steps[a, b] += weight
+    assert value == pytest.approx(np.log(expected))
+    np.testing.assert_allclose(posterior, shares / expected)
+    np.testing.assert_allclose(moves, steps / expected)
+    fast, fast_moves = np.empty((5, 2)), np.zeros((2, 2))
+    assert _chain_kernel.pass_chain(first, move, density, fast, fast_moves) == pytest.approx(value)
+    np.testing.assert_allclose(fast, posterior)
+
+
+def test_a_deletion_residual_is_what_all_others_say():
+    """Against conditioning all measurements at once without the one in question, whatever R that one was given."""
+    log = draw_log(4, 10, ONES)
+    residual, cov = joint_problem(log, ONES)
+    for row in (0, 7, len(residual) - 1):
+        others = np.delete(np.arange(len(residual)), row)
+        weight = np.linalg.solve(cov[np.ix_(others, others)], cov[others, row])
+        expected = residual[row] - weight @ residual[others]
+        spread = cov[row, row] - weight @ cov[others, row] - 1
+        for given in (1.0, 25.0):
+            ratios = np.ones(len(residual))
+            ratios[row] = given
+            noise = scale_rows(log, ratios)
+            found = adjoin(log, process_noise(log, {}), noise)
+            y, s = delete(log, found, noise, log.told, np.array([[row]]))
+            assert abs(y[0, 0]) == pytest.approx(abs(expected))
+            assert s[0, 0] == pytest.approx(spread)
+
+
+AUTO = FilterOptions(imu_noise=SCENARIO.imu.noise, gate=GateOptions(1.0))
+
+
+def test_auto_is_the_fixed_filter_where_the_told_noise_is_right(log):
+    found = run_filter(log.timeline(), build_method("auto"), AUTO)
+    fixed = run_filter(log.timeline(), build_method("fixed"), AUTO)
+    assert found.estimated["position_noise_scale"] == 1
+    np.testing.assert_array_equal(found.lla, fixed.lla)
+
+
+def test_auto_finds_correlated_errors_and_smooths(log):
+    gnss = replace(SCENARIO.gnss, correlated_std=(6.0, 6.0, 10.0), correlation_time=8.0, told_position_std=(1.5, 1.5, 2.5))
+    drive = synthetic_logs.simulate(replace(SCENARIO, gnss=gnss, journey=replace(SCENARIO.journey, duration=180.0)), 3)
+    found = run_filter(drive.timeline(), build_method("auto"), replace(AUTO, smooth=True))
+    assert found.method == "auto-smoothed"
+    assert found.state_names[-3:] == ("fix_position_error_n", "fix_position_error_e", "fix_position_error_d")
+    assert found.estimated["correlated_position_std"][0] == pytest.approx(6, rel=0.5)
+    assert found.estimated["position_correlation_time"] == pytest.approx(8, rel=0.6)
+    at = np.searchsorted(drive.truth.t_ns, found.t_ns)
+    rows = np.flatnonzero(drive.truth.t_ns[np.minimum(at, len(drive.truth) - 1)] == found.t_ns)
+    error = earth.ned_between(found.lla[rows], drive.truth.lla[at[rows]])
+    square = np.einsum("ki,kij,kj->k", error, np.linalg.inv(found.cov[rows, :3, :3]), error)
+    assert square.mean() < 9
+
+
+def test_auto_weighs_outliers_of_ranges_down():
+    scenario = synthetic_logs.with_duration(synthetic_logs.SCENARIOS["ranges-open"], 45.0)
+    drive = synthetic_logs.simulate(scenario, 1)
+    ranges = drive.ranges
+    wrong = np.random.default_rng(1).random(len(ranges)) < 0.05
+    off = replace(drive, ranges=replace(ranges, pseudorange=ranges.pseudorange + 60.0 * wrong))
+    options = FilterOptions(imu_noise=scenario.imu.noise, gate=GateOptions(1.0))
+    solution = run_filter(off.timeline(), build_method("auto"), options)
+    series = next(series for series in solution.innovations if series.kind == "range")
+    ratio = (series.noise_std / series.nominal_std)[:, 0]
+    outlying = np.abs(series.residual[:, 0]) > 40
+    assert outlying.sum() > 10
+    assert np.median(ratio[outlying]) > 5 * np.median(ratio[~outlying])

@@ -23,11 +23,19 @@ import numpy as np
 from navreplay.adapt.fixed import Fixed
 from navreplay.error_models.noise_sources import IMU_SOURCES, MOTION_SOURCES, scale_sources
 from navreplay.filters.calibration import Settled, Trace
-from navreplay.filters.linear_log import LinearLog, adjoin, hold_sources, process_noise, scale_rows
+from navreplay.filters.linear_log import LinearLog, adjoin, process_noise, scale_rows
 from navreplay.options import FilterOptions
 from navreplay.timeline import LogError
 
-__all__ = ["EmOffline", "Factors", "improve_factors", "maximise_likelihood"]
+__all__ = [
+    "SCALED_KINDS",
+    "EmOffline",
+    "Factors",
+    "apply_factors",
+    "estimated_figures",
+    "improve_factors",
+    "maximise_likelihood",
+]
 
 Factors = Mapping[str, float]
 """Of variances, by kind of measurement and by source of process noise."""
@@ -36,23 +44,23 @@ _GROWTH = 1.5
 """Of the stretch of EM's steps."""
 _KIND_SCALES = {"position": "position_noise_scale", "velocity": "velocity_noise_scale"}
 _RANGE_SCALES = {"range": "pseudorange_noise_scale", "range_rate": "range_rate_noise_scale"}
+SCALED_KINDS = (*_KIND_SCALES, *_RANGE_SCALES)
+"""Kinds of measurement whose told noise the options scale; of others it is kept."""
 
 
 def improve_factors(logs: Sequence[LinearLog], factors: Factors) -> tuple[Factors, float]:
     """One step of expectation and maximisation, and the log-likelihood with the factors as given."""
     total, gained, count = 0.0, dict.fromkeys(factors, 0.0), dict.fromkeys(factors, 0)
     for log in logs:
-        ratios = np.empty(len(log.residual))
-        for kind, at in log.rows_by_kind.items():
-            ratios[at] = factors[kind]
-        noise = scale_rows(log, ratios)
+        noise = scale_rows(log, log.by_kind(factors))
         found = adjoin(log, process_noise(log, factors), noise)
         total += found.log_likelihood
         excess = found.pulls[:, :, None] * found.pulls[:, None, :] - found.holds
         rows = (noise * excess).sum(axis=2)[log.epochs, log.places]
         for kind, at in log.rows_by_kind.items():
-            gained[kind] += float(rows[at].sum())
-            count[kind] += len(at)
+            if kind in factors:
+                gained[kind] += float(rows[at].sum())
+                count[kind] += len(at)
         state_excess = found.state_pulls[:, :, None] * found.state_pulls[:, None, :] - found.state_holds
         for name, part in log.sources.items():
             gained[name] += factors[name] * float((part * state_excess).sum())
@@ -101,9 +109,7 @@ class EmOffline:
         """The options with the scales and densities found. Raises LogError for a log without measurements."""
         found, notes = options, []
         for i in range(self.passes):
-            logs = trace(found, Fixed())
-            if i == 0:
-                logs = tuple(hold_sources(log) for log in logs)
+            logs = trace(found, Fixed(), () if i == 0 else IMU_SOURCES + MOTION_SOURCES)
             factors = _all_ones(logs)
             factors, course = maximise_likelihood(logs, factors, self.steps, self.tolerance)
             found = apply_factors(found, factors)
@@ -115,7 +121,8 @@ class EmOffline:
 
 
 def _all_ones(logs: Sequence[LinearLog]) -> Factors:
-    names = dict.fromkeys(name for log in logs for name in (*log.kinds, *log.sources))
+    kinds = [kind for log in logs for kind in log.rows_by_kind if kind in SCALED_KINDS]
+    names = dict.fromkeys((*kinds, *(name for log in logs for name in log.sources)))
     if not names:
         raise LogError("filter 'em-offline': no measurement lies in the time span of the filter; there is no noise to estimate")
     return dict.fromkeys(names, 1.0)

@@ -5,24 +5,51 @@ clock are driven by independent noise, so that each part moves by its own transi
 """
 
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
 from navreplay.error_models.error_model import MotionModel
 from navreplay.error_models.ned import Propagated
-from navreplay.error_models.receiver_clock import ReceiverClock
 from navreplay.strapdown import NavState, Steps
 from navreplay.timeline import Floats
 
-__all__ = ["ClockedModel"]
+__all__ = ["ClockedModel", "ReceiverModel"]
+
+
+class ReceiverModel(Protocol):
+    """c states of a receiver, which its own noise drives: its clock, or a correlated error of its fixes."""
+
+    @property
+    def size(self) -> int:
+        """Number of states c."""
+        ...
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """(c,) names of the states."""
+        ...
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """(c,) units of the states."""
+        ...
+
+    def transitions(self, dt: Floats) -> Floats:
+        """(k, c, c) over dt (k,) [s]."""
+        ...
+
+    def noises(self, dt: Floats) -> Floats:
+        """(k, c, c) covariances of what the noise adds over dt (k,) [s]."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
 class ClockedModel:
-    """The states of motion (n of them) and, behind them, those of the clock (c)."""
+    """The states of motion (n of them) and, behind them, those of the clock (c) or what else the receiver has."""
 
     motion: MotionModel
-    clock: ReceiverClock
+    clock: ReceiverModel
 
     @property
     def size(self) -> int:

@@ -9,8 +9,9 @@ from navreplay.options import FilterOptions
 
 __all__ = ["Calibration", "Settled", "Trace", "settle_nothing"]
 
-Trace = Callable[[FilterOptions, NoiseAdapter[Any]], tuple[LinearLog, ...]]
-"""What a forward pass with these options and this adapter linearises, by stretch."""
+Trace = Callable[[FilterOptions, NoiseAdapter[Any], tuple[str, ...]], tuple[LinearLog, ...]]
+"""What a forward pass with these options and this adapter linearises, by stretch; with the process noise of the sources named
+kept apart."""
 
 
 class Settled(NamedTuple):
@@ -18,7 +19,7 @@ class Settled(NamedTuple):
 
     options: FilterOptions
     adapter: NoiseAdapter[Any]
-    estimated: Mapping[str, float]
+    estimated: Mapping[str, float | tuple[float, float]]
     notes: tuple[str, ...]
 
 

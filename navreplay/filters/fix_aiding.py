@@ -1,13 +1,26 @@
 """Aiding by GNSS fixes: loosely coupled."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from navreplay.alignment import Alignment
 from navreplay.earth import move_lla
+from navreplay.error_models.clocked import ClockedModel
+from navreplay.error_models.correlated_error import CorrelatedErrors
+from navreplay.error_models.error_model import ErrorModel
 from navreplay.error_models.ned import NedErrorModel
 from navreplay.filters.core import symmetric
 from navreplay.filters.update import Observed
-from navreplay.measurements import FixNoise, angular_rate, fix_noise, join, position_measurement, velocity_measurement
+from navreplay.measurements import (
+    FixNoise,
+    Measurement,
+    angular_rate,
+    fix_noise,
+    join,
+    position_measurement,
+    velocity_measurement,
+)
 from navreplay.options import FilterOptions
 from navreplay.rotation import matrix_from_quat
 from navreplay.strapdown import NavState
@@ -23,7 +36,11 @@ class FixAiding:
 
     def __init__(self, fixes: GnssFixSeries, lever_b: Floats, options: FilterOptions, model: NedErrorModel) -> None:
         self.fixes = fixes
-        self.model = model
+        self._inertial = model
+        self._correlated = CorrelatedErrors(options.correlated_noise)
+        self.model: ErrorModel = self._inertial
+        if self._correlated.size:
+            self.model = ClockedModel(self._inertial, self._correlated)
         self._noise = fix_noise(fixes, options)
         self._lever_b = lever_b
         self._has_position = fixes.has_position
@@ -36,12 +53,13 @@ class FixAiding:
 
     def start(self, alignment: Alignment) -> tuple[NavState, Floats]:
         """State and covariance (n, n) at the alignment's fix."""
-        return start_at_fix(self.model, self.fixes, self._noise, alignment, self._lever_b)
+        state, cov = start_at_fix(self._inertial, self.fixes, self._noise, alignment, self._lever_b)
+        return replace(state, clock=np.zeros(self._correlated.size)), self._correlated.enter(cov)
 
     def observe(self, epoch: int, state: NavState, cov: Floats, dtheta: Floats, dt: float) -> Observed:
         """The fix with index epoch, of what it holds."""
         parts = []
-        size = self.model.size
+        size = self._inertial.size
         if self._has_position[epoch]:
             lla, noise = self.fixes.lla[epoch], self._noise.position[epoch]
             parts.append(position_measurement(state, self._lever_b, lla, noise, size))
@@ -49,7 +67,14 @@ class FixAiding:
             rate = angular_rate(state, dtheta, dt)
             vel_n, noise = self.fixes.vel_n[epoch], self._noise.velocity[epoch]
             parts.append(velocity_measurement(state, self._lever_b, rate, vel_n, noise, size))
-        return Observed(join(parts) if parts else None, state, cov)
+        return Observed(self._with_correlated(join(parts), state) if parts else None, state, cov)
+
+    def _with_correlated(self, z: Measurement, state: NavState) -> Measurement:
+        """Against fixes that have the correlated errors as well, where those are states."""
+        if not self._correlated.size:
+            return z
+        seen = self._correlated.jacobian([f"{kind} {label}" for kind, label in zip(z.kinds, z.labels, strict=True)])
+        return z._replace(residual=z.residual - seen @ state.clock, jacobian=np.hstack([z.jacobian, seen]))
 
 
 def start_at_fix(

@@ -16,22 +16,36 @@ from typing import NamedTuple
 import numpy as np
 
 from navreplay import _linear_kernel
+from navreplay.error_models.correlated_error import CorrelatedErrors
 from navreplay.timeline import Floats, Times
 
-__all__ = ["Adjoints", "LinearLog", "adjoin", "hold_sources", "log_likelihood", "process_noise", "scale_rows", "scatter_rows"]
+__all__ = [
+    "Adjoints",
+    "LinearLog",
+    "adjoin",
+    "correlate",
+    "delete",
+    "hold_sources",
+    "log_likelihood",
+    "process_noise",
+    "scale_rows",
+    "scatter_rows",
+]
 
 
 @dataclass(frozen=True, eq=False)
 class LinearLog:
     """k epochs of a stretch with r measured components in all, n error states.
 
-    t_ns: (k,). start: (n, n) covariance before the first transition. transitions: (k, n, n) to each epoch. rest: (k, n, n) the
-    process noise that is not of a source; sources: by name, (k, n, n). corrections: (k, n). starts: (k + 1,) rows of each
-    epoch. residual: (r,). jacobian: (r, n). told: (k, m, m) R of each epoch, the part that it has. labels, kinds: (r,).
+    start_ns, start (n, n): time and covariance before the first transition. t_ns: (k,). transitions: (k, n, n) to each epoch.
+    rest: (k, n, n) the process noise of no source; sources: by name, (k, n, n). corrections: (k, n). starts: (k + 1,)
+    rows of each epoch. residual: (r,). jacobian: (r, n). told: (k, m, m) R of each epoch, the part that it has. labels, kinds:
+    (r,).
     """
 
-    t_ns: Times
+    start_ns: int
     start: Floats
+    t_ns: Times
     transitions: Floats
     rest: Floats
     sources: Mapping[str, Floats]
@@ -48,6 +62,13 @@ class LinearLog:
         """Indices of the components of each kind."""
         kinds = np.array(self.kinds)
         return {kind: np.flatnonzero(kinds == kind) for kind in dict.fromkeys(self.kinds)}
+
+    def by_kind(self, figures: Mapping[str, float]) -> Floats:
+        """(r,) the figure of each component's kind, 1 where there is none."""
+        rows = np.ones(len(self.residual))
+        for kind, at in self.rows_by_kind.items():
+            rows[at] = figures.get(kind, 1.0)
+        return rows
 
     @cached_property
     def epochs(self) -> np.ndarray:
@@ -119,3 +140,38 @@ def adjoin(log: LinearLog, process: Floats, noise: Floats) -> Adjoints:
         log.transitions, log.starts, log.jacobian, innovation, weights, gains, pulls, holds, state_pulls, state_holds
     )
     return Adjoints(value, scatter_rows(log, pulls, 0.0), holds, state_pulls, state_holds)
+
+
+def correlate(log: LinearLog, errors: CorrelatedErrors) -> LinearLog:
+    """The log with those errors of its fixes as c further states, which no correction has touched."""
+    dt = np.diff(log.t_ns, prepend=log.start_ns) / 1e9
+    (k, n), c = log.corrections.shape, errors.size
+    wide = {name: np.zeros((k, n + c, n + c)) for name in ("transitions", "rest", *log.sources)}
+    wide["transitions"][:, :n, :n], wide["transitions"][:, n:, n:] = log.transitions, errors.transitions(dt)
+    wide["rest"][:, :n, :n], wide["rest"][:, n:, n:] = log.rest, errors.noises(dt)
+    for name, part in log.sources.items():
+        wide[name][:, :n, :n] = part
+    return replace(
+        log,
+        start=errors.enter(log.start),
+        transitions=wide.pop("transitions"),
+        rest=wide.pop("rest"),
+        sources=wide,
+        corrections=np.hstack([log.corrections, np.zeros((k, c))]),
+        jacobian=np.hstack([log.jacobian, errors.jacobian(log.labels)]),
+    )
+
+
+def delete(log: LinearLog, found: Adjoints, noise: Floats, told: Floats, rows: np.ndarray) -> tuple[Floats, Floats]:
+    """Groups of m components, rows (e, m), against what all other measurements say of them: residual and spread (e, m) in
+    coordinates in which their told R (of the epochs (k, m', m')) is the identity and the spread is diagonal.
+
+    The residual D^-1 u has the covariance D^-1 = R + spread, with R that of noise (k, m', m').
+    """
+    epochs, places = log.epochs[rows[:, 0]], log.places[rows]
+    block = epochs[:, None, None], places[:, :, None], places[:, None, :]
+    cov = np.linalg.inv(found.holds[block])
+    residual = cov @ found.pulls[epochs[:, None], places][:, :, None]
+    half = np.linalg.inv(np.linalg.cholesky(told[block]))
+    spread, turn = np.linalg.eigh(half @ (cov - noise[block]) @ np.swapaxes(half, 1, 2))
+    return (np.swapaxes(turn, 1, 2) @ half @ residual)[:, :, 0], np.maximum(spread, 0.0)

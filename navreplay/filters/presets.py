@@ -6,6 +6,7 @@ from difflib import get_close_matches
 from typing import Any
 
 from navreplay.adapt.adapter import NoiseAdapter
+from navreplay.adapt.auto import Auto
 from navreplay.adapt.correntropy import Correntropy
 from navreplay.adapt.eiakf import Eiakf
 from navreplay.adapt.em import Em, PrintedEm
@@ -129,6 +130,7 @@ PRESETS: dict[str, Preset | BankPreset] = {
         Preset("em-kf", "P and R by expectation maximisation at each epoch (Lai et al. 2022)", Em),
         Preset("em-kf-printed", "the same with equation (30) as printed", PrintedEm),
         Preset("em-offline", "R and Q by expectation maximisation over the whole log", Fixed, calibration=EmOffline),
+        Preset("auto", "noise as the whole log shows it: scale, steps, heavy tails, errors that stay", Fixed, calibration=Auto),
         Preset("strong-tracking", "prior inflated by a fading factor (Zhou and Frank 1996, Lou et al. 2019)", StrongTracking),
         Preset("h-infinity", "prior widened against the worst case (Simon 2006, Zhang et al. 2015)", HInfinity),
         Preset("ckf", "cubature Kalman filter with the noise it is told (Arasaratnam and Haykin 2009)", Fixed, Cubature),

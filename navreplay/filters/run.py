@@ -18,7 +18,7 @@ from navreplay.filters.range_gate import RangeGate
 from navreplay.filters.record import Recorder
 from navreplay.filters.rows import Rows
 from navreplay.filters.stretches import cut_at_gaps, tell_unreached
-from navreplay.filters.trace import Tracer
+from navreplay.filters.trace import Traces
 from navreplay.filters.update import Estimator
 from navreplay.options import FilterOptions
 from navreplay.solution import Event, Solution
@@ -39,11 +39,12 @@ def run_filter(timeline: Timeline, method: Method, options: FilterOptions, progr
     settled = settle_nothing(options, method.adapter)
     if method.calibration is not None:
 
-        def trace(told: FilterOptions, adapter: NoiseAdapter[Any]) -> tuple[LinearLog, ...]:
+        def trace(told: FilterOptions, adapter: NoiseAdapter[Any], sources: tuple[str, ...]) -> tuple[LinearLog, ...]:
             """What a forward pass with these linearises."""
-            tracers: list[Tracer] = []
-            _run_passes(timeline, replace(method, adapter=adapter), replace(told, output_rate=0.0, smooth=False), tracers)
-            return tuple(log for log in (tracer.linear_log() for tracer in tracers) if log is not None)
+            traces, plain = Traces(sources), replace(told.consider, every_method=False)
+            told = replace(told, output_rate=0.0, smooth=False, consider=plain)
+            _run_passes(timeline, replace(method, adapter=adapter), told, traces)
+            return traces.linear_logs()
 
         settled = method.calibration.settle(options, trace)
     solution = _run_passes(timeline, replace(method, adapter=settled.adapter), settled.options, None, progress)
@@ -55,16 +56,16 @@ def _run_passes(
     timeline: Timeline,
     method: Method,
     options: FilterOptions,
-    tracers: list[Tracer] | None,
+    traces: Traces | None,
     progress: Progress | None = None,
 ) -> Solution:
-    """One pass over all stretches, forward and, where the options say so, backward; tracers, where given, grows by one each."""
+    """One pass over all stretches, forward and, where the options say so, backward; traces, where given, take them down."""
     recorder = Recorder()
     name = f"{method.name}-smoothed" if options.smooth else method.name
     if timeline.imu is None:
         alone = _choose_ranges_alone(timeline, options, recorder)
         setup = set_up(alone, alone.model, method, options)
-        rows = [_run_alone(alone, setup, options, recorder, tracers, _report_of(alone.t_ns, progress))]
+        rows = [_run_alone(alone, setup, options, recorder, traces, _report_of(alone.t_ns, progress))]
         return _join(rows, f"{name} without IMU", setup.model, recorder)
     guidance = choose_guidance(timeline, options, recorder)
     setup = set_up(guidance.aiding, guidance.model, method, options)
@@ -74,7 +75,7 @@ def _run_passes(
     rows = []
     for stretch in stretches:
         try:
-            rows.append(_run_stretch(timeline, guidance, stretch, setup, options, recorder, tracers, report))
+            rows.append(_run_stretch(timeline, guidance, stretch, setup, options, recorder, traces, report))
         except LogError as error:
             if len(stretches) == 1:
                 raise
@@ -135,12 +136,12 @@ def _run_stretch(
     setup: Setup,
     options: FilterOptions,
     recorder: Recorder,
-    tracers: list[Tracer] | None,
+    traces: Traces | None,
     report: Callable[[int], None],
 ) -> Rows:
     start_ns, state, cov = guidance.start(timeline, imu, options, recorder)
     aiding = guidance.aiding
-    estimator = _traced(setup.estimator(guidance.gate(options.gate), recorder), guidance.model, aiding.t_ns, tracers)
+    estimator = _traced(setup.estimator(guidance.gate(options.gate), recorder), guidance.model, aiding.t_ns, traces)
     epochs = np.flatnonzero((aiding.t_ns > start_ns) & (aiding.t_ns <= imu.t_ns[-1]))
     nodes = np.union1d(aiding.t_ns[epochs], _output_times(start_ns, int(imu.t_ns[-1]), options.output_rate))
     steps = make_steps(imu, np.append(nodes, start_ns)).after(start_ns)
@@ -148,12 +149,9 @@ def _run_stretch(
     return _run_epochs(steps, nodes, aiding.t_ns, epochs, state, cov, estimator, setup.model, options, report)
 
 
-def _traced(estimator: Estimator, model: ErrorModel, t_ns: Times, tracers: list[Tracer] | None) -> Estimator:
+def _traced(estimator: Estimator, model: ErrorModel, t_ns: Times, traces: Traces | None) -> Estimator:
     """The estimator or, where traces are asked for, one that takes it down."""
-    if tracers is None:
-        return estimator
-    tracers.append(Tracer(estimator, model, t_ns))
-    return tracers[-1]
+    return estimator if traces is None else traces.follow(estimator, model, t_ns)
 
 
 def _run_alone(
@@ -161,11 +159,11 @@ def _run_alone(
     setup: Setup,
     options: FilterOptions,
     recorder: Recorder,
-    tracers: list[Tracer] | None,
+    traces: Traces | None,
     report: Callable[[int], None],
 ) -> Rows:
     start_ns, state, cov = aiding.start_alone()
-    estimator = _traced(setup.estimator(RangeGate(options.gate), recorder), aiding.model, aiding.t_ns, tracers)
+    estimator = _traced(setup.estimator(RangeGate(options.gate), recorder), aiding.model, aiding.t_ns, traces)
     epochs = np.flatnonzero(aiding.t_ns > start_ns)
     nodes = np.union1d(aiding.t_ns[epochs], _output_times(start_ns, int(aiding.t_ns[-1]), options.output_rate))
     cov, steps = setup.start_covariance(cov), idle_steps(start_ns, nodes)

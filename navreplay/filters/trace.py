@@ -11,18 +11,21 @@ from navreplay.filters.linear_log import LinearLog
 from navreplay.filters.update import Estimator, Updated
 from navreplay.measurements import Measurement
 from navreplay.strapdown import NavState, Steps
-from navreplay.timeline import Floats
+from navreplay.timeline import Floats, Times
 
-__all__ = ["Tracer"]
+__all__ = ["Tracer", "Traces"]
 
 
 @dataclass(slots=True)
 class Tracer:
-    """Drives another estimator from epoch to epoch, without rows in between, and takes down each epoch."""
+    """Drives another estimator from epoch to epoch, without rows in between, and takes down each epoch. muted: by source whose
+    process noise is kept apart, the model without it."""
 
     inner: Estimator
     model: ErrorModel
-    t_ns: np.ndarray
+    t_ns: Times
+    muted: dict[str, ErrorModel]
+    start_ns: int = 0
     start: Floats | None = None
     moved: list[tuple[Floats, Floats, dict[str, Floats]]] = field(default_factory=list)
     corrections: list[Floats] = field(default_factory=list)
@@ -34,11 +37,11 @@ class Tracer:
     ) -> Propagated:
         """As the estimator does; the last epoch's transition and noise, the share of each source apart."""
         if self.start is None:
-            self.start = cov
+            self.start_ns, self.start = steps.start_ns, cov
         moved = self.inner.propagate(state, cov, steps, first, ends, interval, True)
         total = moved.noises[-1]
         sources = {}
-        for name, model in without_sources(self.model).items():
+        for name, model in self.muted.items():
             sources[name] = total - model.propagate(state, cov, steps, first, ends, interval, True).noises[-1]
         self.moved.append((moved.transitions[-1], total - sum(sources.values()), sources))
         return moved
@@ -67,8 +70,9 @@ class Tracer:
                 told[i, : counts[i], : counts[i]] = z.noise
         moved = self.moved[:k]
         return LinearLog(
-            t_ns=self.t_ns[self.epochs],
+            start_ns=self.start_ns,
             start=self.start,
+            t_ns=self.t_ns[self.epochs],
             transitions=np.array([transition for transition, _, _ in moved]),
             rest=np.array([rest for _, rest, _ in moved]),
             sources={name: np.array([sources[name] for _, _, sources in moved]) for name in moved[0][2]},
@@ -80,3 +84,21 @@ class Tracer:
             labels=tuple(f"{kind} {label}" for z in known for kind, label in zip(z.kinds, z.labels, strict=True)),
             kinds=tuple(kind for z in known for kind in z.kinds),
         )
+
+
+@dataclass(slots=True)
+class Traces:
+    """Tracers of the stretches of a log. sources: whose process noise is kept apart."""
+
+    sources: tuple[str, ...]
+    tracers: list[Tracer] = field(default_factory=list)
+
+    def follow(self, estimator: Estimator, model: ErrorModel, t_ns: Times) -> Tracer:
+        """An estimator that takes down another one with that model and epochs t_ns (e,)."""
+        muted = {name: without for name, without in without_sources(model).items() if name in self.sources}
+        self.tracers.append(Tracer(estimator, model, t_ns, muted))
+        return self.tracers[-1]
+
+    def linear_logs(self) -> tuple[LinearLog, ...]:
+        """Those of the stretches with a measurement."""
+        return tuple(log for log in (tracer.linear_log() for tracer in self.tracers) if log is not None)
