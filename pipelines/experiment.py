@@ -38,6 +38,7 @@ __all__ = [
     "Outcome",
     "Published",
     "PublishedNoise",
+    "RatioClaim",
     "Stretch",
     "run_experiment",
     "run_seed",
@@ -129,6 +130,17 @@ class NoiseClaim:
 
 
 @dataclass(frozen=True, slots=True)
+class RatioClaim:
+    """A promise: the error of an arm in a quantity and a stretch is at most so many times that of the reference."""
+
+    stretch: str
+    quantity: str
+    arm: str
+    reference: str
+    most: float
+
+
+@dataclass(frozen=True, slots=True)
 class Experiment:
     """Everything that decides an experiment but the seeds. description is one line, paper names the source. arms: the first is
     the reference of paired differences. drawn: labels of up to six arms that the plots show. start: errors that every filter
@@ -147,6 +159,7 @@ class Experiment:
     published: tuple[Published, ...] = ()
     orders: tuple[OrderClaim, ...] = ()
     noise_claims: tuple[NoiseClaim, ...] = ()
+    ratios: tuple[RatioClaim, ...] = ()
     published_noise: tuple[PublishedNoise, ...] = ()
     start: StartErrors | None = None
     perturbations: tuple[Perturbation, ...] = ()

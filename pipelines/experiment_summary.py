@@ -9,6 +9,7 @@ from scipy.special import chdtri, stdtrit
 
 from navreplay.timeline import Floats
 from pipelines.experiment import DEGREES, QUANTITIES, ArmOutcome, AttitudeScale, Experiment, OrderClaim, Outcome, Stretch
+from pipelines.experiment_promises import judge_promises, tell_promises
 from pipelines.plain_data import plain_data
 from pipelines.report import Report
 
@@ -77,6 +78,7 @@ def summarise_experiment(experiment: Experiment, outcomes: Sequence[Outcome]) ->
         }
         for arm in experiment.arms
     }
+    promises = judge_promises(experiment.ratios, figures, _interval)
     orders = [_judge_order(claim, figures) for claim in (*published_orders(experiment), *experiment.orders)]
     explanations = [
         {
@@ -112,7 +114,8 @@ def summarise_experiment(experiment: Experiment, outcomes: Sequence[Outcome]) ->
             ],
             "orders": orders,
             "explanations": explanations,
-            "conclusions": _conclude(orders, explanations, len(outcomes)),
+            "promises": promises,
+            "conclusions": _conclude(orders, explanations, len(outcomes)) + tell_promises(promises),
             "notes": experiment.notes,
         }
     )

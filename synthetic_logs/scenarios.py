@@ -102,7 +102,7 @@ _SPIRAL = Motion(
     straight(100.0)
     + accelerate(120.0, 40.0)
     + straight(60.0)
-    + spiral(720 * _DEG, course_rate_of_bank(20 * _DEG, 120.0), 4 * _DEG)
+    + spiral(360 * _DEG, course_rate_of_bank(20 * _DEG, 120.0), 4 * _DEG)
     + straight(60.0)
     + accelerate(80.0, 40.0),
     speed=80.0,

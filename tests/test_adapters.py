@@ -8,7 +8,7 @@ from scipy.stats import multivariate_normal
 
 from navreplay import _likelihood_kernel
 from navreplay.adapt.correntropy import Correntropy
-from navreplay.adapt.em import Em, Estimate, improve
+from navreplay.adapt.em import Em, Estimate, PrintedEm, improve
 from navreplay.adapt.h_infinity import HInfinity
 from navreplay.adapt.huber import Huber
 from navreplay.adapt.iae import Iae
@@ -71,6 +71,26 @@ def test_em_carries_the_moments_of_the_prediction(seed):
     np.testing.assert_allclose(found.innovation.spread, again.spread, atol=1e-9 * np.abs(again.spread).max())
     np.testing.assert_allclose(found.innovation.cross, again.cross, atol=1e-9 * np.abs(again.cross).max())
     assert np.linalg.eigvals(np.linalg.solve(z.noise, found.noise)).real.min() > 0.05 * (1 - 1e-9)
+
+
+@pytest.mark.parametrize("printed", [False, True])
+@given(seed=st.integers(0, 1000))
+def test_em_is_its_equations_with_the_jacobian_written_out(printed, seed):
+    """Three iterations of (26)-(28), (38), (39) at one epoch of one component, where the floor does not bite."""
+    prior, z = draw_problem(seed, m=1)
+    adapter = (PrintedEm if printed else Em)(iterations=3, floor=1e-9)
+    innovation = Linearised().innovate(prior, z)
+    adapted = adapter.adapt(adapter.init(), prior, innovation)
+    h, p, r, nu = z.jacobian, prior.cov, z.noise, innovation.residual
+    for _ in range(3):
+        gain = p @ h.T @ np.linalg.inv(h @ p @ h.T + r)
+        x, posterior = prior.mean + gain @ nu, p - gain @ h @ p
+        left = nu if printed else z.residual - h @ x
+        p, r = posterior + np.outer(x - prior.mean, x - prior.mean), np.outer(left, left) + h @ posterior @ h.T
+    got = condition(adapted.prior, Linearised().innovate(adapted.prior, z), adapted.noise)
+    np.testing.assert_allclose(got.mean, x, rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(got.cov, posterior, rtol=1e-6, atol=1e-6)
+    assert adapted.state[innovation.labels[0]] * z.noise[0, 0] == pytest.approx(r[0, 0], rel=1e-6)
 
 
 @given(st.integers(0, 10_000))
