@@ -1,7 +1,7 @@
 """CPU time of a bank of five over that of the single filter: python benchmarks/bank_cost.py
 
-At 200 Hz IMU with 1 Hz fixes, and at 100 Hz with 20 Hz, both in turns in one process with linear algebra on one thread; the least
-of several runs, which other work on the machine disturbs least.
+At 200 Hz IMU with 1 Hz fixes, and at 100 Hz with 20 Hz, both in turns in one process with linear algebra on one thread; the
+least of several runs, which other work on the machine disturbs least.
 """
 
 import os
