@@ -4,11 +4,13 @@ Words are those of RXM-SFRBX: 30-bit words of GPS, QZSS and BeiDou right-aligned
 strings of GLONASS left-aligned in 32-bit words. Weeks are told by a time near the log's, for GPS repeats them every 1024.
 """
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
-from importers.beidou_words import decode_d1
-from importers.ephemeris import KEPLER, Ephemerides
+from importers.beidou_words import decode_d1, decode_d2
+from importers.ephemeris import Ephemerides
 from importers.galileo_words import decode_inav
 from importers.glonass_words import decode_strings
 from importers.gps_words import decode_lnav
@@ -17,6 +19,13 @@ from navreplay.time_scales import LeapSeconds
 __all__ = ["decode_words"]
 
 _GPS, _GALILEO, _BEIDOU, _QZSS, _GLONASS = 0, 2, 3, 5, 6
+_KEPLER_DECODERS = (
+    (_GPS, "G", partial(decode_lnav, "G")),
+    (_QZSS, "G", partial(decode_lnav, "J")),
+    (_BEIDOU, "C", decode_d1),
+    (_BEIDOU, "C", decode_d2),
+)
+"""By system: whose ionosphere model it sends, and what decodes its messages."""
 
 
 def decode_words(
@@ -33,20 +42,19 @@ def decode_words(
     10).
     """
     known = np.zeros(len(gnss), dtype=bool)
-    kepler = [np.empty(0, KEPLER)]
-    klobuchar = None
-    for system, letter in ((_GPS, "G"), (_QZSS, "J")):
+    klobuchar, model = None, "G"
+    rows = np.flatnonzero(gnss == _GALILEO)
+    records, good = decode_inav(number[rows], words[rows], near_ns)
+    known[rows[good]] = True
+    kepler = [records]
+    for system, letter, decode in _KEPLER_DECODERS:
         rows = np.flatnonzero(gnss == system)
-        records, coefficients, good = decode_lnav(letter, number[rows], words[rows], near_ns)
+        records, coefficients, good = decode(number[rows], words[rows], near_ns)
         known[rows[good]] = True
         kepler.append(records)
-        klobuchar = coefficients if klobuchar is None else klobuchar
-    for system, decode in ((_GALILEO, decode_inav), (_BEIDOU, decode_d1)):
-        rows = np.flatnonzero(gnss == system)
-        records, good = decode(number[rows], words[rows], near_ns)
-        known[rows[good]] = True
-        kepler.append(records)
+        if klobuchar is None and coefficients is not None:
+            klobuchar, model = coefficients, letter
     rows = np.flatnonzero(gnss == _GLONASS)
     glonass, good = decode_strings(number[rows], frequency[rows], words[rows], near_ns, leap)
     known[rows[good]] = True
-    return Ephemerides(np.concatenate(kepler), glonass, klobuchar), known
+    return Ephemerides(np.concatenate(kepler), glonass, klobuchar, model), known

@@ -34,11 +34,13 @@ _VALID_S = {"G": 7200.0, "E": 14400.0, "C": 21600.0, "J": 7200.0, "R": 1800.0}
 @dataclass(frozen=True, eq=False, slots=True)
 class Ephemerides:
     """What satellites have broadcast, and precise orbits beside it. kepler, glonass: records of the two dtypes, in any order.
-    klobuchar: (8,) alpha0..3, beta0..3, None where unknown."""
+    klobuchar: (8,) alpha0..3, beta0..3, None where unknown. klobuchar_system: the system whose model they belong to, G or C
+    (QZSS uses that of GPS)."""
 
     kepler: NDArray[np.void]
     glonass: NDArray[np.void]
     klobuchar: Floats | None = None
+    klobuchar_system: str = "G"
     precise: PreciseOrbits | None = None
 
     def __bool__(self) -> bool:
@@ -46,13 +48,16 @@ class Ephemerides:
 
 
 def join_ephemerides(parts: Sequence[Ephemerides]) -> Ephemerides:
-    """All records; of the ionosphere's coefficients the last, of precise orbits the last."""
-    klobuchar = [part.klobuchar for part in parts if part.klobuchar is not None]
+    """All records; of the ionosphere's coefficients the last, BeiDou's only where there are none of GPS; of precise orbits the
+    last."""
+    ionosphere = [part for part in parts if part.klobuchar is not None]
+    ionosphere.sort(key=lambda part: part.klobuchar_system == "G")
     precise = [part.precise for part in parts if part.precise is not None]
     return Ephemerides(
         np.concatenate([np.empty(0, KEPLER), *(part.kepler for part in parts)]),
         np.concatenate([np.empty(0, GLONASS), *(part.glonass for part in parts)]),
-        klobuchar[-1] if klobuchar else None,
+        ionosphere[-1].klobuchar if ionosphere else None,
+        ionosphere[-1].klobuchar_system if ionosphere else "G",
         precise[-1] if precise else None,
     )
 

@@ -25,13 +25,18 @@ def _rinex(table: Table, near_ns: int, leap: LeapSeconds) -> tuple[Ephemerides, 
     klobuchar = table.columns["klobuchar"]
     known = klobuchar[np.isfinite(klobuchar).all(axis=1)]
     return (
-        Ephemerides(kepler[kepler["sat"] != ""], glonass[glonass["sat"] != ""], known[-1] if len(known) else None),
+        Ephemerides(
+            kepler[kepler["sat"] != ""],
+            glonass[glonass["sat"] != ""],
+            known[-1] if len(known) else None,
+            str(table.columns["klobuchar_system"][0]) if len(known) else "G",
+        ),
         {},
     )
 
 
 def _sp3(table: Table, near_ns: int, leap: LeapSeconds) -> tuple[Ephemerides, Mapping[str, int]]:
-    return Ephemerides(np.empty(0, KEPLER), np.empty(0, GLONASS), None, precise_orbits(table)), {}
+    return Ephemerides(np.empty(0, KEPLER), np.empty(0, GLONASS), precise=precise_orbits(table)), {}
 
 
 def _words(table: Table, near_ns: int, leap: LeapSeconds) -> tuple[Ephemerides, Mapping[str, int]]:
@@ -56,10 +61,11 @@ def _told(kepler: np.ndarray, glonass: np.ndarray, table: Table) -> tuple[Epheme
 
 def _ionosphere(table: Table, near_ns: int, leap: LeapSeconds) -> tuple[Ephemerides, Mapping[str, int]]:
     """Klobuchar's coefficients, as the u-blox driver beside gnss_comm publishes them."""
-    known = [np.asarray(data, dtype=np.float64) for data in table.columns["data"] if len(data) == 8]
+    arrays = [np.asarray(data, dtype=np.float64) for data in table.columns["data"]]
+    known = [data for data in arrays if data.shape == (8,) and np.isfinite(data).all()]
     lost = len(table.log_time_ns) - len(known)
     nothing = np.empty(0, KEPLER), np.empty(0, GLONASS)
-    return Ephemerides(*nothing, known[-1] if known else None), {"not eight coefficients": lost} if lost else {}
+    return Ephemerides(*nothing, known[-1] if known else None), {"not eight numbers": lost} if lost else {}
 
 
 EPHEMERIS_TYPES: Mapping[str, Reader] = {

@@ -5,7 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from importers.ephemeris import KEPLER
-from importers.subframes import Bits, complete_sets, nearest_time
+from importers.subframes import Bits, complete_sets, last_klobuchar, nearest_time
 from navreplay.timeline import Floats
 
 __all__ = ["decode_lnav"]
@@ -40,7 +40,7 @@ def decode_lnav(
     number = number[good]
     part = bits.whole(43, 3)
     page = bits.whole(50, 6)
-    ionosphere = np.flatnonzero((part == 4) & (page == _IONOSPHERE_PAGE[letter]) & (bits.whole(48, 2) != 0))
+    ionosphere = (part == 4) & (page == _IONOSPHERE_PAGE[letter]) & (bits.whole(48, 2) != 0)
     issue = np.select([part == 1, part == 2, part == 3], [bits.whole(168, 8), bits.whole(48, 8), bits.whole(216, 8)], -1)
     sets = complete_sets(number.tolist(), part.tolist(), issue.tolist(), (1, 2, 3))
     records = np.zeros(len(sets), KEPLER)
@@ -58,11 +58,4 @@ def decode_lnav(
     records["tgd"][:, 0] = one.scaled(160, 8, -31)
     records["health"] = one.whole(64, 6)
     records["sat"] = [f"{letter}{value:02d}" for value in number[sets[:, 0]]]
-    return records, _klobuchar(bits.rows(ionosphere[-1:])), good
-
-
-def _klobuchar(page: Bits) -> Floats | None:
-    if len(page) == 0:
-        return None
-    exponents = (-30, -27, -24, -24, 11, 14, 16, 16)
-    return np.concatenate([page.scaled(56 + 8 * i, 8, exponent) for i, exponent in enumerate(exponents)])
+    return records, last_klobuchar(bits.rows(ionosphere), 56), good

@@ -63,9 +63,9 @@ def convert_ranges(
         raise LogError(f"{name}: none of its {n} pseudoranges is usable: {_count(screening)}; {_cause(screening, ephemerides)}")
     order = kept[np.lexsort((rows.sat[kept], rows.t_ns[kept]))]
     chosen = RangeRows(**{field: getattr(rows, field)[order] for field in RangeRows.__slots__})
-    klobuchar = _klobuchar(flat, ephemerides)
-    series, told = _build(name, chosen, klobuchar)
-    return series, (*account(joined, screening), *uses), (*notes, *told)
+    series, told = _build(name, chosen)
+    series, model = _with_ionosphere(name, series, flat, ephemerides)
+    return series, (*account(joined, screening), *uses), (*notes, *told, *model)
 
 
 def _screen(screening: Screening, rows: RangeRows, settings: RangeInput) -> None:
@@ -118,7 +118,7 @@ def _apply_ephemerides(screening: Screening, rows: RangeRows, ephemerides: Ephem
     return changed, tuple(notes)
 
 
-def _build(name: str, rows: RangeRows, klobuchar: Floats | None) -> tuple[RangeSeries, tuple[str, ...]]:
+def _build(name: str, rows: RangeRows) -> tuple[RangeSeries, tuple[str, ...]]:
     """The series of rows in the order of time, with satellites turned to the time of reception."""
     free = rows.applied & _FREE
     if (free != free[0]).any():
@@ -157,7 +157,6 @@ def _build(name: str, rows: RangeRows, klobuchar: Floats | None) -> tuple[RangeS
         sat_vel_e=vel,
         ionosphere_removed=bool(free[0] & Applied.IONOSPHERE),
         troposphere_removed=bool(free[0] & Applied.TROPOSPHERE),
-        klobuchar=klobuchar,
     )
     return series, tuple(notes)
 
@@ -167,14 +166,24 @@ def _positive(values: Floats) -> Floats:
     return np.where((values > 0) & np.isfinite(values), values, np.nan)
 
 
-def _klobuchar(sources: Sequence[Source], ephemerides: Ephemerides) -> Floats | None:
-    """From the observations' own messages, else from the navigation data."""
-    for source in sources:
-        values = source.table.columns.get("klobuchar")
-        known = None if values is None else values[np.isfinite(values).all(axis=1)]
-        if known is not None and len(known):
-            return np.asarray(known[-1], dtype=np.float64)
-    return ephemerides.klobuchar
+def _with_ionosphere(
+    name: str, series: RangeSeries, sources: Sequence[Source], ephemerides: Ephemerides
+) -> tuple[RangeSeries, tuple[str, ...]]:
+    """The series with the coefficients of the ionosphere's broadcast model, from the observations' own messages, else from the
+    navigation data, and what that assumes."""
+    tables = [source.table.columns for source in sources]
+    own = np.concatenate([np.empty((0, 8)), *(columns["klobuchar"] for columns in tables if "klobuchar" in columns)])
+    own = own[np.isfinite(own).all(axis=1)]
+    coefficients, system = (own[-1], "G") if len(own) else (ephemerides.klobuchar, ephemerides.klobuchar_system)
+    if series.ionosphere_removed:
+        notes: tuple[str, ...] = ()
+    elif coefficients is None:
+        notes = (f"{name}: the log has no coefficients of an ionosphere model: that delay (metres by day) is not corrected",)
+    elif system == "C":
+        notes = (f"{name}: the ionosphere's delay is told by BeiDou's broadcast model, as the log has no coefficients of GPS",)
+    else:
+        notes = (f"{name}: the ionosphere's delay is told by GPS's broadcast model",)
+    return replace(series, klobuchar=coefficients, klobuchar_system=system), notes
 
 
 def _count(screening: Screening) -> str:

@@ -36,7 +36,7 @@ def is_rinex_navigation(head: str) -> bool:
 
 def read_rinex_navigation(path: str, leap: LeapSeconds) -> Table:
     """Columns ``kepler`` and ``glonass`` of those dtypes, a row per record with the name of its satellite in one of the two,
-    and ``klobuchar`` (n, 8). Raises LogError where the file holds no ephemeris."""
+    and ``klobuchar`` (n, 8) with ``klobuchar_system``. Raises LogError where the file holds no ephemeris."""
     text = read_rinex(path, "N")
     start, count, message = _find_records(text)
     system = text.lines.field(start, 0, 1)[:, 0]
@@ -61,7 +61,7 @@ def read_rinex_navigation(path: str, leap: LeapSeconds) -> Table:
     if damaged.all():
         raise LogError(f"{path}: the navigation file holds no ephemeris that can be read ({len(usable)} records)")
     columns = {"kepler": kepler[~damaged], "glonass": glonass[~damaged]}
-    columns["klobuchar"] = np.tile(_klobuchar(text), (int((~damaged).sum()), 1))
+    columns["klobuchar"], columns["klobuchar_system"] = _klobuchar(text, int((~damaged).sum()))
     times = np.where(is_glonass, glonass["toe_ns"], kepler["toe_ns"])[~damaged]
     columns["t_gps_ns"] = times
     return Table(times, columns, len(usable), {reason: n for reason, n in rejected.items() if n})
@@ -144,20 +144,30 @@ def _finite(records: NDArray[np.void]) -> NDArray[np.bool_]:
     return good
 
 
-def _klobuchar(text: RinexText) -> Floats:
-    """GPS alpha and beta of the header (RINEX 3) or of the last message (RINEX 4); NaN where there are none."""
+def _klobuchar(text: RinexText, n: int) -> tuple[Floats, NDArray[np.str_]]:
+    """Alpha and beta (n, 8) of the header (RINEX 3) or of the last message (RINEX 4), NaN where there are none, and the system
+    (n,) whose model they are for: GPS, or BeiDou where there is no other."""
     found = {content[:4]: content for content, label in text.header if label == "IONOSPHERIC CORR"}
-    for alpha, beta in (("GPSA", "GPSB"), ("QZSA", "QZSB")):
+    for alpha, beta, system in (("GPSA", "GPSB", "G"), ("QZSA", "QZSB", "G"), ("BDSA", "BDSB", "C")):
         if alpha in found and beta in found:
             parts = [found[key][5 + 12 * i : 17 + 12 * i] for key in (alpha, beta) for i in range(4)]
-            return exponent_numbers(np.array([list(part.ljust(12).encode()[:12]) for part in parts], dtype=np.uint8))
+            numbers = exponent_numbers(np.array([list(part.ljust(12).encode()[:12]) for part in parts], dtype=np.uint8))
+            return np.tile(numbers, (n, 1)), np.full(n, system)
+    for system, kind in (("G", "LNAV"), ("C", "D1D2")):
+        numbers = _last_message(text, system, kind)
+        if np.isfinite(numbers).all():
+            return np.tile(numbers, (n, 1)), np.full(n, system)
+    return np.full((n, 8), np.nan), np.full(n, "G")
+
+
+def _last_message(text: RinexText, system: str, kind: str) -> Floats:
+    """The eight numbers of the last ionosphere message of a kind (RINEX 4), NaN where there is none."""
     lines = text.lines
     marks = [row for row in range(len(lines)) if lines.buffer[lines.start[row]] == ord(">")] if text.version >= 4 else []
     for row in reversed(marks):
         words = lines.text(row).split()
-        if words[1:2] == ["ION"] and words[2:3] and words[2][0] == "G" and words[3:4] == ["LNAV"] and row + 3 < len(lines) + 1:
-            rows = np.array([row + 1] * 3 + [row + 2] * 4 + [row + 3])
+        if words[1:2] == ["ION"] and words[2:3] and words[2][0] == system and words[3:4] == [kind]:
+            rows = np.minimum([row + 1] * 3 + [row + 2] * 4 + [row + 3], len(lines) - 1)
             places = [1, 2, 3, 0, 1, 2, 3, 0]
-            rows = np.minimum(rows, len(lines) - 1)
             return np.array([_value(lines, rows[i : i + 1], 0, place)[0] for i, place in enumerate(places)])
     return np.full(8, np.nan)

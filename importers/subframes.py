@@ -7,9 +7,10 @@ from numpy.typing import NDArray
 
 from navreplay.timeline import Floats, Times
 
-__all__ = ["Bits", "complete_sets", "nearest_time"]
+__all__ = ["Bits", "complete_sets", "last_klobuchar", "nearest_time"]
 
 _WEEK_NS = 604_800 * 10**9
+_KLOBUCHAR_EXPONENTS = (-30, -27, -24, -24, 11, 14, 16, 16)
 
 
 class Bits:
@@ -26,6 +27,11 @@ class Bits:
             for i, (width, skip) in enumerate(zip(widths, skipped, strict=True))
         ]
         return cls(np.concatenate(parts, axis=1).astype(np.uint8))
+
+    @classmethod
+    def side_by_side(cls, parts: Sequence["Bits"]) -> "Bits":
+        """Messages made of the parts, each of n."""
+        return cls(np.concatenate([part._bits for part in parts], axis=1))
 
     def __len__(self) -> int:
         return len(self._bits)
@@ -78,6 +84,15 @@ def complete_sets(
             told[name] = version
             sets.append(rows)
     return np.array(sets, dtype=np.intp).reshape(-1, len(wanted))
+
+
+def last_klobuchar(pages: Bits, first: int) -> Floats | None:
+    """The ionosphere's coefficients (8,) alpha0..3, beta0..3 [s and powers of semicircles], which begin at bit first, of the
+    last of pages; None where there is no page. GPS, QZSS and BeiDou scale them alike."""
+    if len(pages) == 0:
+        return None
+    last = pages.rows(np.array([len(pages) - 1]))
+    return np.concatenate([last.scaled(first + 8 * i, 8, exponent) for i, exponent in enumerate(_KLOBUCHAR_EXPONENTS)])
 
 
 def nearest_time(sow_s: NDArray[np.int64] | Floats, near_ns: Times) -> Times:

@@ -1,8 +1,9 @@
 """Delays of satellite signals in the atmosphere, by broadcast and standard models; look angles.
 
-Ionosphere: Klobuchar, IS-GPS-200N (2022), 20.3.3.5.2.5. Troposphere: Saastamoinen, Atmospheric correction for the troposphere
-and stratosphere in radio ranging of satellites, Geophysical Monograph 15 (1972) 247, with the ICAO standard atmosphere at a
-relative humidity of 70 %. Everything broadcasts over leading dimensions.
+Ionosphere: Klobuchar, IS-GPS-200N (2022), 20.3.3.5.2.5, and BeiDou's variant of it, BDS-SIS-ICD-B1I-3.0, 5.2.4.7.
+Troposphere: Saastamoinen, Atmospheric correction for the troposphere and stratosphere in radio ranging of satellites,
+Geophysical Monograph 15 (1972) 247, with the ICAO standard atmosphere at a relative humidity of 70 %. Everything broadcasts
+over leading dimensions.
 """
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike
 from navreplay import earth
 from navreplay.timeline import Floats
 
-__all__ = ["SPEED_OF_LIGHT", "klobuchar_delay", "look_angles", "saastamoinen_delay"]
+__all__ = ["SPEED_OF_LIGHT", "beidou_delay", "klobuchar_delay", "look_angles", "saastamoinen_delay"]
 
 SPEED_OF_LIGHT = 299_792_458.0
 """[m/s]."""
@@ -24,6 +25,10 @@ _DAY = 86400.0
 _NIGHT_DELAY = 5e-9
 _PEAK = 50400.0
 _SHORTEST_PERIOD = 72000.0
+_LONGEST_BEIDOU_PERIOD = 172_800.0
+_SHELL_RATIO = 6378.0 / (6378.0 + 375.0)
+"""Of the radii of the Earth and of BeiDou's ionosphere."""
+_B1I_OVER_L1 = 1561.098 / 1575.42
 
 
 def look_angles(antenna_lla: Floats, sat_pos_e: Floats) -> tuple[Floats, Floats]:
@@ -56,6 +61,27 @@ def klobuchar_delay(
     day = np.where(np.abs(phase) < 1.57, amplitude * (1 - phase**2 / 2 + phase**4 / 24), 0.0)
     slant = 1.0 + 16.0 * (0.53 - e) ** 3
     return np.asarray(SPEED_OF_LIGHT * slant * (_NIGHT_DELAY + day))
+
+
+def beidou_delay(
+    coefficients: Floats, lat: ArrayLike, lon: ArrayLike, elevation: ArrayLike, azimuth: ArrayLike, tow_s: ArrayLike
+) -> Floats:
+    """The same from BeiDou's coefficients, which hold at geographic latitudes, in a shell 375 km high, for B1I (1561.098 MHz);
+    the delay is that at L1. Up to 14 s in tow_s are of no matter."""
+    lat, lon, e, azimuth = (np.asarray(angle, dtype=np.float64) for angle in (lat, lon, elevation, azimuth))
+    sine = _SHELL_RATIO * np.cos(np.maximum(e, 0.0))
+    central = np.pi / 2 - np.maximum(e, 0.0) - np.arcsin(sine)
+    pierce_lat = np.arcsin(np.sin(lat) * np.cos(central) + np.cos(lat) * np.sin(central) * np.cos(azimuth))
+    pierce_lon = lon + np.arctan2(
+        np.sin(central) * np.sin(azimuth) * np.cos(lat), np.cos(central) - np.sin(lat) * np.sin(pierce_lat)
+    )
+    local = (43200.0 / np.pi * pierce_lon + np.asarray(tow_s, dtype=np.float64)) % _DAY
+    powers = np.abs(pierce_lat / np.pi)[..., None] ** np.arange(4)
+    amplitude = np.maximum(powers @ coefficients[:4], 0.0)
+    period = np.clip(powers @ coefficients[4:], _SHORTEST_PERIOD, _LONGEST_BEIDOU_PERIOD)
+    apart = local - _PEAK
+    day = np.where(np.abs(apart) < period / 4, amplitude * np.cos(2 * np.pi * apart / period), 0.0)
+    return np.asarray(SPEED_OF_LIGHT * _B1I_OVER_L1**2 * (_NIGHT_DELAY + day) / np.sqrt(1 - sine**2))
 
 
 def saastamoinen_delay(lat: ArrayLike, height: ArrayLike, elevation: ArrayLike) -> Floats:

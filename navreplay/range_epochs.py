@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navreplay import earth
-from navreplay.atmosphere import klobuchar_delay, look_angles, saastamoinen_delay
+from navreplay.atmosphere import beidou_delay, klobuchar_delay, look_angles, saastamoinen_delay
 from navreplay.options import RangeOptions
 from navreplay.timeline import Floats, LogError, RangeSeries, Times
 
@@ -143,7 +143,8 @@ def correct_ranges(
         delay += saastamoinen_delay(lla[:, 0], lla[:, 2], elevation)
     if options.ionosphere and not ranges.ionosphere_removed and ranges.klobuchar is not None:
         tow_s = (epochs.t_ns[epochs.epoch_of] % _WEEK_NS) / 1e9
-        l1 = klobuchar_delay(ranges.klobuchar, lla[:, 0], lla[:, 1], elevation, azimuth, tow_s)
+        model = beidou_delay if ranges.klobuchar_system == "C" else klobuchar_delay
+        l1 = model(ranges.klobuchar, lla[:, 0], lla[:, 1], elevation, azimuth, tow_s)
         delay += l1 / epochs.carrier**2
     # a signal of unknown strength counts as a strong one
     weakness = 10 ** ((options.cn0_reference - np.nan_to_num(epochs.cn0, nan=np.inf)) / 10)

@@ -164,7 +164,7 @@ class RangeSeries:
     cn0 [dB-Hz]: (n,), NaN where unknown. sat_pos_e: (n, 3) [m] of the satellite at transmission, in Earth-fixed axes of the
     time of reception (turned for the signal's flight). sat_vel_e: (n, 3) [m/s] in the same axes.
     ionosphere_removed, troposphere_removed: whether the pseudoranges are free of them already. klobuchar: (8,) broadcast
-    alpha0..3 and beta0..3, None where unknown.
+    alpha0..3 and beta0..3, None where unknown; klobuchar_system: whose model they belong to, G (GPS) or C (BeiDou).
     Raises LogError unless times never fall and pseudoranges and satellite states are finite.
     """
 
@@ -181,6 +181,7 @@ class RangeSeries:
     ionosphere_removed: bool = False
     troposphere_removed: bool = False
     klobuchar: Floats | None = None
+    klobuchar_system: str = "G"
 
     def __post_init__(self) -> None:
         n = len(self.t_ns)

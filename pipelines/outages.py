@@ -13,7 +13,7 @@ from pipelines.sections import OutageSection
 __all__ = ["outage_windows", "withhold_fixes", "withhold_ranges"]
 
 _TOLERANCE_NS = 1_000_000
-_RANGE_WIDE = ("ionosphere_removed", "troposphere_removed", "klobuchar")
+_RANGE_WIDE = ("ionosphere_removed", "troposphere_removed", "klobuchar", "klobuchar_system")
 _RANGE_COLUMNS = tuple(field.name for field in fields(RangeSeries) if field.name not in _RANGE_WIDE)
 
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from navreplay import earth
-from navreplay.atmosphere import klobuchar_delay, look_angles, saastamoinen_delay
+from navreplay.atmosphere import beidou_delay, klobuchar_delay, look_angles, saastamoinen_delay
 
 ALPHA_BETA = np.array([0.3820e-7, 0.1490e-7, -0.1790e-6, 0.0, 0.1430e6, 0.0, -0.3280e6, 0.1130e6])
 
@@ -29,6 +29,35 @@ def test_klobuchar_stays_within_bounds_and_broadcasts(lat, lon, elevation, azimu
     assert 1.4 < one < 150
     many = klobuchar_delay(ALPHA_BETA, np.full(3, lat), lon, np.full(3, elevation), azimuth, tow)
     np.testing.assert_allclose(many, one, rtol=1e-12)
+
+
+def test_beidou_delay_at_the_zenith_follows_its_formula():
+    """40 N (0.2222 semicircles), 105 E: 7 h of GPS time are 14 h there; an hour later the cosine of a period of 86400 s."""
+    coefficients = np.array([2e-8, 1e-7, -3e-7, 4e-7, 86400.0, 0.0, 0.0, 0.0])
+    amplitude = 2e-8 + 1e-7 / 4.5 - 3e-7 / 4.5**2 + 4e-7 / 4.5**3
+    for tow_s, share in ((7 * 3600.0, 1.0), (8 * 3600.0, np.cos(np.pi / 12)), (18 * 3600.0, 0.0)):
+        for lat in (40.0, -40.0):
+            delay = beidou_delay(coefficients, np.radians(lat), np.radians(105.0), np.pi / 2, 0.3, tow_s)
+            expected = (5e-9 + share * amplitude) * 299792458 * (1561.098 / 1575.42) ** 2
+            assert float(delay) == pytest.approx(expected, rel=1e-12)
+
+
+@given(st.floats(-1.5, 1.5), st.floats(-3.1, 3.1), st.floats(0.05, 1.5), st.floats(0, 6.28))
+def test_beidou_delay_is_that_where_the_ray_pierces_the_shell(lat, lon, elevation, azimuth):
+    """The ray met with a sphere 375 km up, by vectors; there the delay is that at the zenith over the cosine of the angle."""
+    up = np.array([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)])
+    east = np.array([-np.sin(lon), np.cos(lon), 0.0])
+    north = np.cross(up, east)
+    ray = np.sin(elevation) * up + np.cos(elevation) * (np.cos(azimuth) * north + np.sin(azimuth) * east)
+    here, shell = 6378.0 * up, 6378.0 + 375.0
+    length = -here @ ray + np.sqrt((here @ ray) ** 2 - 6378.0**2 + shell**2)
+    pierced = (here + length * ray) / shell
+    place = np.arcsin(pierced[2]), np.arctan2(pierced[1], pierced[0])
+    coefficients = np.array([1e-8, 2e-7, -1e-6, 2e-6, 1e5, 2e5, -3e5, 4e5])
+    slant = float(beidou_delay(coefficients, lat, lon, elevation, azimuth, 50_000.0))
+    assert slant == pytest.approx(
+        float(beidou_delay(coefficients, *place, np.pi / 2, 0.0, 50_000.0)) / (pierced @ ray), rel=1e-6
+    )
 
 
 def test_saastamoinen_at_the_zenith_is_the_sum_of_its_parts():

@@ -198,6 +198,24 @@ def test_version_4_gives_the_same(files: tuple[Path, Path]) -> None:
     np.testing.assert_allclose(timeline.ranges.klobuchar, [1e-8, 2e-8, 3e-8, 4e-8, 5e4, 6e4, 7e4, 8e4])
 
 
+@pytest.mark.parametrize("version", [3, 4])
+def test_the_ionosphere_of_beidou_is_taken_where_there_is_no_other(files: tuple[Path, Path], version: int) -> None:
+    observations, navigation = files
+    text = navigation.read_text()
+    before = load(observations, navigation).ranges
+    if version == 4:
+        text = as_version_4(text).replace("> ION G01 LNAV", "> ION C06 D1D2")
+    navigation.write_text(text.replace("GPSA", "BDSA").replace("GPSB", "BDSB"))
+    timeline = load(observations, navigation)
+    assert timeline.ranges is not None
+    assert timeline.ranges.klobuchar is not None
+    assert before is not None
+    assert before.klobuchar_system == "G"
+    assert timeline.ranges.klobuchar_system == "C"
+    expected = before.klobuchar if version == 3 else [1e-8, 2e-8, 3e-8, 4e-8, 5e4, 6e4, 7e4, 8e4]
+    np.testing.assert_allclose(timeline.ranges.klobuchar, expected)
+
+
 def sp3_text(epochs: int, ranges_start_ns: int) -> str:
     """Satellites G01 and R02 on circles."""
     start = np.datetime64("1980-01-06") + np.timedelta64(ranges_start_ns // 10**9 - 5 * 900, "s")

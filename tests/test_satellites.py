@@ -18,7 +18,7 @@ rtklib = pytest.importorskip("pyrtklib", reason="RTKLIB is the judge here")
 
 SAMPLE = Path(__file__).parent / "data" / "walk_0827.ubx"
 S = 10**9
-RTKLIB_BUFFER = 380
+RTKLIB_BUFFER = 11 * 38
 RTKLIB_NAMES = {
     "e": "e", "i0": "i0", "omega0": "OMG0", "omega": "omg", "m0": "M0", "delta_n": "deln", "omega_dot": "OMGd", "idot": "idot",
     "crc": "crc", "crs": "crs", "cuc": "cuc", "cus": "cus", "cic": "cic", "cis": "cis", "toe_sow": "toes", "af0": "f0",
