@@ -20,7 +20,6 @@ from math import exp, log, sqrt
 from typing import Literal, NamedTuple
 
 import numpy as np
-from scipy.optimize import minimize, minimize_scalar
 
 from navreplay.adapt.em_offline import SCALED_KINDS, Factors, apply_factors, estimated_figures, maximise_likelihood
 from navreplay.adapt.noise_levels import LEAST_EPOCHS, Chain, find_levels, ratios_of
@@ -160,6 +159,8 @@ def _find_correlation(logs: Sequence[LinearLog], found: Found) -> Found:
 
 def _try_correlation(logs: Sequence[LinearLog], found: Found, kind: Kind) -> tuple[Found, float]:
     """With an error of that kind that stays, and the gain of log-likelihood over the white one alone."""
+    from scipy.optimize import minimize, minimize_scalar  # slow to load, and hardly any other method needs it
+
     known = [hold_sources(one) for one in _with(logs, found)]
     told = np.median(np.concatenate([_told_variances(one, kind) for one in logs]), axis=0)
     std = sqrt(told[:2].mean()), sqrt(told[2])
