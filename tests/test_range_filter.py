@@ -217,6 +217,15 @@ def test_what_aids_the_filter_can_be_chosen(log):
         run_filter(Timeline(fixes=fixes, ranges=timeline.ranges), build_method("fixed"), options(use="fixes"))
 
 
+def test_epochs_scattered_over_years_are_refused_in_one_line(log):
+    """As when the week of a table is taken from a column that counts epochs."""
+    ranges = log.timeline().ranges
+    epoch = (ranges.t_ns - ranges.t_ns[0]) // 10**9
+    scattered = replace(ranges, t_ns=ranges.t_ns + epoch * 7 * 86_400 * 10**9)
+    with pytest.raises(LogError, match=r"reach over [\d.]+ days, too long for rows at 1 Hz; are their stamps right"):
+        run_filter(Timeline(ranges=scattered), build_method("fixed"), options())
+
+
 def test_the_same_run_twice_is_identical(log):
     first = run_filter(log.timeline(), build_method("iae"), options())
     second = run_filter(log.timeline(), build_method("iae"), options())

@@ -29,6 +29,9 @@ __all__ = ["run_filter"]
 
 Progress = Callable[[float], None]
 
+_MOST_ROWS = 20_000_000
+_DAY_NS = 86_400 * 10**9
+
 
 def run_filter(timeline: Timeline, method: Method, options: FilterOptions, progress: Progress | None = None) -> Solution:
     """The solution over a timeline: of the IMU, by ranges, fixes or attitudes; without IMU of the antenna, by ranges alone.
@@ -205,7 +208,13 @@ def _run_epochs(
 
 
 def _output_times(start_ns: int, end_ns: int, rate: float) -> Times:
+    """Times of rows beside the epochs. Raises LogError where no memory would hold them."""
     if rate <= 0:
         return np.empty(0, dtype=np.int64)
     period = round(1e9 / rate)
+    if (end_ns - start_ns) // period > _MOST_ROWS:
+        raise LogError(
+            f"filter: the measurements reach over {(end_ns - start_ns) / _DAY_NS:.4g} days, too long for rows at {rate:g} Hz; "
+            "are their stamps right (is the week another column)? Otherwise set output.rate_hz lower"
+        )
     return np.arange((start_ns // period + 1) * period, end_ns + 1, period, dtype=np.int64)
