@@ -1,4 +1,4 @@
-"""BeiDou's D2 message and the ionosphere's coefficients of D1, D2 and LNAV, from words that an encoder of its own has made."""
+"""BeiDou's D2 message and the ionosphere's coefficients of D1, D2, LNAV and gnss_comm, from words of an encoder of its own."""
 
 from pathlib import Path
 
@@ -10,6 +10,7 @@ from importers.beidou_words import decode_d1, decode_d2
 from importers.ephemeris import Ephemerides, join_ephemerides
 from importers.ephemeris_messages import EPHEMERIS_TYPES
 from importers.kepler_orbits import kepler_states
+from importers.log import Table
 from importers.ubx import UbxLog
 from navreplay.time_scales import LEAP_SECONDS
 from tests.beidou_messages import D2_FIELDS, KLOBUCHAR, KLOBUCHAR_BITS, d1_subframe_1, d2_pages, sfrbx
@@ -147,6 +148,16 @@ def test_of_several_logs_the_ionosphere_of_gps_goes_first() -> None:
     assert (chosen.klobuchar[0], chosen.klobuchar_system) == (2.0, "G")
     assert join_ephemerides(parts[3:]).klobuchar_system == "C"
     assert nothing.klobuchar is None
+
+
+def test_an_ionosphere_message_counts_only_with_eight_numbers() -> None:
+    data = np.empty(3, dtype=object)
+    data[:] = [KLOBUCHAR, KLOBUCHAR[:7], np.full(8, np.nan)]
+    table = Table(np.zeros(3, dtype=np.int64), {"data": data}, 3, {})
+    ephemerides, useless = EPHEMERIS_TYPES["gnss_comm/StampedFloat64Array"](table, NOW_NS, LEAP_SECONDS)
+    assert ephemerides.klobuchar is not None
+    np.testing.assert_array_equal(ephemerides.klobuchar, KLOBUCHAR)
+    assert useless == {"not eight numbers": 2}
 
 
 def ephemerides_of(path: Path) -> tuple[Ephemerides, int]:
