@@ -356,6 +356,32 @@ def _multiply_left(phi, decay, total, work):
 
 
 @njit(cache=True)
+def _begin_totals(phi, decay, density, span, bridge, total_phi, total_q):
+    """Transition F = [phi; diag(decay)] and noise of a node's first covariance step, as `_multiply_left` and
+    `_move_covariance` would make them of I and of zero."""
+    n = total_phi.shape[0]
+    total_phi[:, :] = 0
+    total_q[:, :] = 0
+    _add_noise(total_q, density, span / 2, bridge / 2)
+    half = np.diag(total_q).copy()
+    total_phi[:9] = phi
+    for i in range(9, n):
+        total_phi[i, i] = decay[i - 9]
+        total_q[i, i] = half[i] * decay[i - 9] * decay[i - 9]
+    for i in range(9):
+        for j in range(9, n):
+            total_q[i, j] = phi[i, j] * half[j] * decay[j - 9]
+            total_q[j, i] = total_q[i, j]
+        for j in range(i + 1):
+            value = 0.0
+            for k in range(n):
+                value += phi[i, k] * half[k] * phi[j, k]
+            total_q[i, j] = value
+            total_q[j, i] = value
+    _add_noise(total_q, density, span / 2, bridge / 2)
+
+
+@njit(cache=True)
 def propagate(
     start,
     p_start,
@@ -400,14 +426,12 @@ def propagate(
     f_dt = np.zeros(3)
     keep = transitions.shape[0] > 0
     fading = np.isfinite(tau).any()
-    identity = np.eye(n)
     total_phi = np.eye(n)
     total_q = np.zeros((n, n))
     step = 0
     _fill_matrix(x[6], x[7], x[8], x[9], c)
     for node in range(ends.shape[0]):
-        total_phi[:, :] = identity
-        total_q[:, :] = 0
+        fresh = True
         span = 0.0
         bridge = 0.0
         while step < ends[node]:
@@ -430,9 +454,12 @@ def propagate(
             _move_covariance(phi, decay, density, span, bridge, p, work)
             if cross.shape[1] > 0:
                 _multiply_left(phi, decay, cross, work)
-            if keep:
+            if keep and fresh:
+                _begin_totals(phi, decay, density, span, bridge, total_phi, total_q)
+            elif keep:
                 _multiply_left(phi, decay, total_phi, work)
                 _move_covariance(phi, decay, density, span, bridge, total_q, work)
+            fresh = False
             span = 0.0
             bridge = 0.0
             c_dt[:, :] = 0
