@@ -29,6 +29,7 @@ __all__ = [
     "evaluate",
     "find_outages",
     "interpolate",
+    "normalised_squares",
     "summarise",
     "summarise_outages",
 ]
@@ -115,7 +116,7 @@ def interpolate(solution: Solution, t_ns: Times, max_step_s: float = 0.6) -> Int
     )
 
 
-def _squared(error: Floats, cov: Floats) -> Floats:
+def normalised_squares(error: Floats, cov: Floats) -> Floats:
     """error' cov^-1 error (k,), NaN where a row is unknown or its covariance is not positive."""
     good = np.asarray(np.isfinite(error).all(axis=1) & np.isfinite(cov).all(axis=(1, 2)))
     good[good] = np.linalg.det(cov[good]) > 0
@@ -130,7 +131,7 @@ def _series(
     std = np.sqrt(np.diagonal(cov, axis1=1, axis2=2))
     if reference_cov is not None:
         cov = cov + np.where(np.isfinite(reference_cov), reference_cov, 0.0)
-    return ErrorSeries(labels, unit, error, std, _squared(error, cov))
+    return ErrorSeries(labels, unit, error, std, normalised_squares(error, cov))
 
 
 def _measure_errors(at: Interpolated, reference: Trajectory, lever_b: Floats) -> dict[str, ErrorSeries]:

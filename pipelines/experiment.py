@@ -13,7 +13,7 @@ import numpy as np
 
 from navreplay.filters.presets import Method, build_method
 from navreplay.filters.run import run_filter
-from navreplay.metrics import evaluate
+from navreplay.metrics import evaluate, normalised_squares
 from navreplay.options import FilterOptions
 from navreplay.rotation import matrix_from_quat
 from navreplay.solution import Solution, WeightSeries
@@ -26,6 +26,7 @@ from synthetic_logs.ballistic import BallisticFlight
 from synthetic_logs.simulation import Journey, Scenario, SyntheticLog, simulate, truth_at
 
 __all__ = [
+    "CONSISTENT",
     "DEGREES",
     "LAUNCH_ARCSEC",
     "QUANTITIES",
@@ -45,6 +46,8 @@ __all__ = [
 ]
 
 QUANTITIES = ("position", "velocity", "attitude")
+CONSISTENT = (*QUANTITIES, "gyro bias")
+"""Of what NEES is judged."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,7 +174,8 @@ class Experiment:
 @dataclass(frozen=True, eq=False, slots=True)
 class ArmOutcome:
     """One arm on one seed. errors (k, 9): position NED [m], velocity NED [m/s] and rotation vector [rad], in NED or, of a
-    ballistic flight, in its launch frame, estimated minus true. nees (k, 3): of the three. Both NaN where the solution does not
+    ballistic flight, in its launch frame, estimated minus true. nees (k, 4): of the three, and of the gyro bias where the
+    filter estimates one constant. Both NaN where the solution does not
     reach. noise: by kind of measurement. epochs: with a measurement. weights: of a bank."""
 
     errors: Floats
@@ -269,12 +273,13 @@ def _judge(solution: Solution, log: SyntheticLog, t_ns: Times) -> ArmOutcome:
     reference = truth_at(log.scenario.journey, t_ns)
     evaluation = evaluate(solution, reference)
     at = np.searchsorted(t_ns, evaluation.t_ns)
-    errors, nees = np.full((len(t_ns), 9), np.nan), np.full((len(t_ns), 3), np.nan)
+    errors, nees = np.full((len(t_ns), 9), np.nan), np.full((len(t_ns), len(CONSISTENT)), np.nan)
     # where attitudes are measured the position shall not count: against the stars, still resolved in NED
     judged = evaluation.errors | {"attitude": evaluation.errors.get("inertial_attitude", evaluation.errors["attitude"])}
     for i, quantity in enumerate(QUANTITIES):
         errors[at, 3 * i : 3 * i + 3] = judged[quantity].error
         nees[at, i] = judged[quantity].nees
+    nees[at, -1] = _gyro_bias_nees(solution, log, t_ns[at])
     motion = log.scenario.journey.motion
     if isinstance(motion, BallisticFlight):
         elapsed = (t_ns - log.scenario.journey.start_ns) / 1e9
@@ -283,3 +288,14 @@ def _judge(solution: Solution, log: SyntheticLog, t_ns: Times) -> ArmOutcome:
         errors[:, 6:] = np.einsum("kij,kj->ki", matrix_from_quat(q_ln), errors[:, 6:])
     epochs = len(np.unique(np.concatenate([np.empty(0, np.int64), *(series.t_ns for series in solution.innovations)])))
     return ArmOutcome(errors, nees, compare_noise(solution.innovations, log), epochs, solution.weights)
+
+
+def _gyro_bias_nees(solution: Solution, log: SyntheticLog, t_ns: Times) -> Floats:
+    """(k,) at the last rows before t_ns (k,); NaN where the bias is no state, or not the only one of the gyros' errors."""
+    if "gyro_bias_x" not in solution.state_names or "gyro_markov_x" in solution.state_names:
+        return np.full(len(t_ns), np.nan)
+    rows = np.searchsorted(solution.t_ns, t_ns, side="right") - 1
+    true = log.gyro_errors.bias[np.searchsorted(log.imu.t_ns, solution.t_ns[rows])]
+    start = solution.state_names.index("gyro_bias_x")
+    cov = solution.cov[rows, start : start + 3, start : start + 3]
+    return normalised_squares(solution.gyro_bias[rows] - true, cov)

@@ -9,7 +9,7 @@ import numpy as np
 
 from navreplay.solution import WeightSeries
 from navreplay.timeline import Floats, LogError
-from pipelines.experiment import QUANTITIES, Experiment, Outcome
+from pipelines.experiment import CONSISTENT, QUANTITIES, Experiment, Outcome
 from pipelines.experiment_summary import SETTLED, WHOLE, summarise_experiment
 from pipelines.plot import Plot
 from pipelines.report import Report, dump_json
@@ -76,7 +76,7 @@ def experiment_tables(report: Report) -> tuple[Table, ...]:
         *(_mean_noise_table(report, stretch) for stretch in report["stretches"]),
         _settling_table(report),
         _switching_table(report),
-        *(_nees_table(report, quantity, stretches) for quantity in QUANTITIES),
+        *(_nees_table(report, quantity, stretches) for quantity in CONSISTENT),
         _arm_table(report),
         Table("Notes", ("",), tuple((text,) for text in report["notes"])),
     ]

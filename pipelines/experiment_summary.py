@@ -8,7 +8,17 @@ import numpy as np
 from scipy.special import chdtri, stdtrit
 
 from navreplay.timeline import Floats
-from pipelines.experiment import DEGREES, QUANTITIES, ArmOutcome, AttitudeScale, Experiment, OrderClaim, Outcome, Stretch
+from pipelines.experiment import (
+    CONSISTENT,
+    DEGREES,
+    QUANTITIES,
+    ArmOutcome,
+    AttitudeScale,
+    Experiment,
+    OrderClaim,
+    Outcome,
+    Stretch,
+)
 from pipelines.experiment_promises import judge_promises, tell_promises
 from pipelines.plain_data import plain_data
 from pipelines.report import Report
@@ -185,10 +195,11 @@ def _consistency(label: str, stretch: Stretch, outcomes: Sequence[Outcome]) -> d
     inside = (averages > low) & (averages < high)
     return {
         quantity: {
-            "mean": float(averages[known[:, i], i].mean()) if known[:, i].any() else float("nan"),
-            "share_inside": float(inside[known[:, i], i].mean()) if known[:, i].any() else float("nan"),
+            "mean": float(averages[known[:, i], i].mean()),
+            "share_inside": float(inside[known[:, i], i].mean()),
         }
-        for i, quantity in enumerate(QUANTITIES)
+        for i, quantity in enumerate(CONSISTENT)
+        if known[:, i].any()
     }
 
 

@@ -67,6 +67,9 @@ def _render_sample(style: str) -> str:
 
 
 def _render_table(table: Table) -> str:
+    if table.is_list:
+        items = "".join([f"<li>{escape(text)}</li>" for (text,) in table.rows])
+        return f"<section><h2>{escape(table.title)}</h2><ul>{items}</ul></section>\n"
     numeric = [
         bool(table.rows) and all(_FIGURE_CELL.fullmatch(row[i]) for row in table.rows) and any(row[i] for row in table.rows)
         for i in range(len(table.header))

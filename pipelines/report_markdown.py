@@ -15,6 +15,8 @@ def _escape(text: str) -> str:
 
 
 def _render_table(table: Table) -> str:
+    if table.is_list:
+        return f"## {table.title}\n\n" + "\n".join(f"- {_escape(text)}" for (text,) in table.rows) + "\n"
     rows = [table.header, ("---",) * len(table.header)]
     lines = ["| " + " | ".join(cells) + " |" for cells in rows]
     lines += ["| " + " | ".join(_escape(cell) for cell in row) + " |" for row in table.rows]

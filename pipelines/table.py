@@ -16,12 +16,17 @@ class Figure:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A table of texts. note: one sentence below it (may be empty)."""
+    """A table of texts. note: one sentence below it (may be empty). One column without a header is a list of sentences."""
 
     title: str
     header: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     note: str = ""
+
+    @property
+    def is_list(self) -> bool:
+        """Whether it is a list of sentences."""
+        return self.header == ("",)
 
 
 def figure_text(value: float | None, unit: str = "") -> str:
