@@ -108,7 +108,7 @@ def test_mean_noise_and_settling_are_those_of_the_components():
     true, ratio = np.tile([4.0, 9.0], (60, 1)), np.ones((60, 2))
     ratio[:50, 0], ratio[:50, 1] = 4.0, 9.0
     noise = {"position": NoiseRatio(np.repeat(t_s, 2), (true * ratio).ravel(), ratio.ravel(), ("north", "east"))}
-    arm = ArmOutcome(np.zeros((60, 9)), np.ones((60, 3)), noise, 60)
+    arm = ArmOutcome(np.zeros((60, 9)), np.ones((60, 4)), noise, 60)
     outcomes = [Outcome(1, t_s, dict.fromkeys(("fixed", "srmakf", "oracle"), arm), {}, {"fixed": 0.12})]
     experiment = shorten("redundant-noise", 60.0, ("fixed", "srmakf"))
     claim = replace(experiment.noise_claims[0], kind="position")
@@ -135,7 +135,7 @@ def made_outcome(seed: int, errors: dict[str, float], nees: float = 3.0) -> Outc
         table[:, 0] = table[:, 3] = error
         table[:, 8] = np.radians(error)
         arms[label] = ArmOutcome(
-            table, np.full((60, 3), nees), {"range": NoiseRatio(t_s, np.full(60, 2.1), np.full(60, 1.05))}, 60
+            table, np.full((60, 4), nees), {"range": NoiseRatio(t_s, np.full(60, 2.1), np.full(60, 1.05))}, 60
         )
     return Outcome(seed, t_s, arms, {}, dict.fromkeys(errors, 0.1))
 
