@@ -237,8 +237,9 @@ def test_smoothing_halves_the_errors_and_stays_consistent():
     assert 4 < nees.mean() < 18
 
 
-def test_progress_ends_with_one(log):
+@pytest.mark.parametrize("name", ["fixed", "em-offline", "auto"])
+def test_progress_ends_with_one(log, name):
     shares: list[float] = []
-    run_filter(log.timeline(), build_method("fixed"), options(), shares.append)
+    run_filter(log.timeline(), build_method(name), options(), shares.append)
     assert shares == sorted(shares)
     assert shares[-1] == 1.0

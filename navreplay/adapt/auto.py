@@ -65,6 +65,11 @@ class Auto:
 
     passes: int = 2
 
+    @property
+    def traces(self) -> int:
+        """How many passes it asks for."""
+        return 1 + self.passes
+
     def settle(self, options: FilterOptions, trace: Trace) -> Settled:
         """The options with what was found, and R by epoch."""
         logs = trace(options, Prescribed(), ())

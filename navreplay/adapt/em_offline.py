@@ -105,6 +105,11 @@ class EmOffline:
     steps: int = 100
     tolerance: float = 0.01
 
+    @property
+    def traces(self) -> int:
+        """How many passes it asks for."""
+        return self.passes
+
     def settle(self, options: FilterOptions, trace: Trace) -> Settled:
         """The options with the scales and densities found. Raises LogError for a log without measurements."""
         found, notes = options, []

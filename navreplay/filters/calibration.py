@@ -26,6 +26,11 @@ class Settled(NamedTuple):
 class Calibration(Protocol):
     """A choice of options and adapter that knows the whole log."""
 
+    @property
+    def traces(self) -> int:
+        """How many passes it asks for."""
+        ...
+
     def settle(self, options: FilterOptions, trace: Trace) -> Settled:
         """What to filter with, from options as told."""
         ...

@@ -41,18 +41,30 @@ def run_filter(timeline: Timeline, method: Method, options: FilterOptions, progr
     """
     settled = settle_nothing(options, method.adapter)
     if method.calibration is not None:
+        shares = iter(_share_out(progress, method.calibration.traces + 1))
 
         def trace(told: FilterOptions, adapter: NoiseAdapter[Any], sources: tuple[str, ...]) -> tuple[LinearLog, ...]:
             """What a forward pass with these linearises."""
             traces, plain = Traces(sources), replace(told.consider, every_method=False)
             told = replace(told, output_rate=0.0, smooth=False, consider=plain)
-            _run_passes(timeline, replace(method, adapter=adapter), told, traces)
+            _run_passes(timeline, replace(method, adapter=adapter), told, traces, next(shares))
             return traces.linear_logs()
 
         settled = method.calibration.settle(options, trace)
+        progress = next(shares)
     solution = _run_passes(timeline, replace(method, adapter=settled.adapter), settled.options, None, progress)
     told = tuple(Event(int(solution.t_ns[0]), "info", note) for note in settled.notes)
     return replace(solution, estimated=settled.estimated, events=told + solution.events)
+
+
+def _share_out(progress: Progress | None, passes: int) -> list[Progress | None]:
+    """What each of so many passes, one after the other, tells its progress."""
+
+    def part(tell: Progress, done: int) -> Progress:
+        """Of the pass behind so many others."""
+        return lambda share: tell((done + share) / passes)
+
+    return [None if progress is None else part(progress, done) for done in range(passes)]
 
 
 def _run_passes(
