@@ -1,6 +1,6 @@
 """Cubature points through the mechanisation, compiled: arrays in, arrays out. `.py_func` of each kernel is its reference.
 
-State and error as in `navreplay._kernels`. With P = L L' and N = n + extra the points are +-sqrt(N) L_i, i = 1 ... n, and,
+State and error as in `navreplay._ned_kernel`. With P = L L' and N = n + extra the points are +-sqrt(N) L_i, i = 1 ... n, and,
 where extra is 1, a pair at the nominal state: that of a direction in which the error cannot lie (Gao et al. 2021, (17)-(19),
 with P singular along the quaternion). From the halves a_i = (d_i+ - d_i-) / (2 sqrt(N)) and s_i = (d_i+ + d_i-) / 2 of the
 differences d at the end, mean and covariance (21), (22) are sum s_i / N and sum a_i a_i' + sum s_i s_i' / N - mean mean' + Q:
@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from navreplay import earth
-from navreplay._kernels import _fade, _fill_matrix, _multiply, _small_rotation, _step
+from navreplay._strapdown_kernel import fade, fill_matrix, multiply, small_rotation, take_step
 
 _A = earth.SEMI_MAJOR_AXIS
 _E2 = earth.ECCENTRICITY_SQUARED
@@ -110,8 +110,8 @@ def retract(x, north, east, error, additive):
     if additive:
         pw, px, py, pz = 1.0, 0.5 * error[6], 0.5 * error[7], 0.5 * error[8]
     else:
-        pw, px, py, pz = _small_rotation(error[6], error[7], error[8])
-    qw, qx, qy, qz = _multiply(pw, px, py, pz, x[6], x[7], x[8], x[9])
+        pw, px, py, pz = small_rotation(error[6], error[7], error[8])
+    qw, qx, qy, qz = multiply(pw, px, py, pz, x[6], x[7], x[8], x[9])
     scale = 1 / math.sqrt(qw * qw + qx * qx + qy * qy + qz * qz)
     x[6], x[7], x[8], x[9] = qw * scale, qx * scale, qy * scale, qz * scale
     for i in range(3):
@@ -129,7 +129,7 @@ def fill_difference(moved, x, north, east, additive, error):
     error[0] = (moved[0] - x[0]) * north
     error[1] = (moved[1] - x[1]) * east
     error[2] = x[2] - moved[2]
-    w, a, b, c = _multiply(moved[6], moved[7], moved[8], moved[9], x[6], -x[7], -x[8], -x[9])
+    w, a, b, c = multiply(moved[6], moved[7], moved[8], moved[9], x[6], -x[7], -x[8], -x[9])
     if additive:
         scale = 2 / w
     else:
@@ -147,11 +147,11 @@ def fill_difference(moved, x, north, east, additive, error):
 @njit(cache=True)
 def _carry(x, dt, dtheta, dvel, first, last, tau, fading, n, c, dv_n, body):
     """Moves packed x over the steps from first up to, not with, last."""
-    _fill_matrix(x[6], x[7], x[8], x[9], c)
+    fill_matrix(x[6], x[7], x[8], x[9], c)
     for i in range(first, last):
-        _step(x, dt[i], dtheta[i], dvel[i], c, dv_n, body)
+        take_step(x, dt[i], dtheta[i], dvel[i], c, dv_n, body)
         if fading:
-            _fade(x, dt[i], tau, n)
+            fade(x, dt[i], tau, n)
 
 
 @njit(cache=True)
@@ -160,8 +160,8 @@ def propagate(
 ):
     """Moments over k nodes, from points drawn anew behind each.
 
-    start (w), p_start (n, n), cross_start (n, c), steps, ends (k), tau (n - 9) and interval as in `_kernels.propagate`; points
-    and a nominal state beside them take merged steps. extra: 1 for the additive quaternion, 0 for the rotation vector.
+    start (w), p_start (n, n), cross_start (n, c), steps, ends (k), tau (n - 9) and interval as in `_ned_kernel.propagate`;
+    points and a nominal state beside them take merged steps. extra: 1 for the additive quaternion, 0 for the rotation vector.
     transitions, noises (k, n, n): on entry those of the linear model, on return the statistically linearised transition and
     what makes the covariance complete beside it. Filled: states (k, w), covariances (k, n, n), crosses (k, n, c).
     """

@@ -1,4 +1,4 @@
-"""Mechanisation and error dynamics in the launch-inertial frame, compiled; the counterpart of `_kernels` in NED.
+"""Mechanisation and error dynamics in the launch-inertial frame, compiled; the counterpart of `_ned_kernel`.
 
 Packed state (16): position (3) [m] and velocity (3) [m/s] in launch axes, q_lb (4), gyro bias (3) [rad/s], accelerometer bias
 (3) [m/s^2]. Error state (15), true minus computed: position, velocity, rotation vector phi in launch axes with C_lb true =
@@ -15,15 +15,8 @@ import numpy as np
 from numba import njit
 
 from navreplay import earth
-from navreplay._kernels import (
-    _attract,
-    _fill_matrix,
-    _fill_transition,
-    _move_covariance,
-    _multiply,
-    _multiply_left,
-    _small_rotation,
-)
+from navreplay._ned_kernel import fill_transition, move_covariance, multiply_left
+from navreplay._strapdown_kernel import attract, fill_matrix, multiply, small_rotation
 
 _GM = earth.GM
 
@@ -48,7 +41,7 @@ def _fill_gravitation(c_il, r_l, g_l):
     y = c_il[1, 0] * r_l[0] + c_il[1, 1] * r_l[1] + c_il[1, 2] * r_l[2]
     z = c_il[2, 0] * r_l[0] + c_il[2, 1] * r_l[1] + c_il[2, 2] * r_l[2]
     across = math.sqrt(x * x + y * y)
-    outward, northward = _attract(across, z, math.sqrt(across * across + z * z))
+    outward, northward = attract(across, z, math.sqrt(across * across + z * z))
     gx, gy = outward * x / across, outward * y / across
     for i in range(3):
         g_l[i] = c_il[0, i] * gx + c_il[1, i] * gy + c_il[2, i] * northward
@@ -73,11 +66,11 @@ def _step(x, dt, dtheta, dvel, c, c_il, centre, force, middle, g_l):
         change = force[i] + g_l[i] * dt
         x[i] += (x[3 + i] + 0.5 * change) * dt
         x[3 + i] += change
-    pw, px, py, pz = _small_rotation(tx, ty, tz)
-    qw, qx, qy, qz = _multiply(x[6], x[7], x[8], x[9], pw, px, py, pz)
+    pw, px, py, pz = small_rotation(tx, ty, tz)
+    qw, qx, qy, qz = multiply(x[6], x[7], x[8], x[9], pw, px, py, pz)
     scale = 1 / math.sqrt(qw * qw + qx * qx + qy * qy + qz * qz)
     x[6], x[7], x[8], x[9] = qw * scale, qx * scale, qy * scale, qz * scale
-    _fill_matrix(x[6], x[7], x[8], x[9], c)
+    fill_matrix(x[6], x[7], x[8], x[9], c)
 
 
 @njit(cache=True)
@@ -108,7 +101,7 @@ def propagate_launch(start, dt, dtheta, dvel, bridged, ends, density, tau, inter
     c, c_start, c_dt, gradient = np.empty((3, 3)), np.empty((3, 3)), np.zeros((3, 3)), np.empty((3, 3))
     force, middle, g_l, f_dt = np.empty(3), np.empty(3), np.empty(3), np.zeros(3)
     step = 0
-    _fill_matrix(x[6], x[7], x[8], x[9], c)
+    fill_matrix(x[6], x[7], x[8], x[9], c)
     for node in range(ends.shape[0]):
         transitions[node] = np.eye(15)
         noises[node] = 0
@@ -132,11 +125,11 @@ def propagate_launch(start, dt, dtheta, dvel, bridged, ends, density, tau, inter
                 continue
             fill_gradient(middle, gradient)
             _fill_rate_matrix(span, gradient, c_dt, f_dt, a)
-            _fill_transition(a, phi)
+            fill_transition(a, phi)
             for i in range(6):
                 decay[i] = math.exp(-span / tau[i])
-            _multiply_left(phi, decay, transitions[node], work)
-            _move_covariance(phi, decay, density, span, bridge, noises[node], work)
+            multiply_left(phi, decay, transitions[node], work)
+            move_covariance(phi, decay, density, span, bridge, noises[node], work)
             span = 0.0
             bridge = 0.0
             c_dt[:, :] = 0

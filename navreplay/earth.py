@@ -72,7 +72,7 @@ def attract(across: Any, along: Any, distance: Any) -> tuple[Any, Any]:
     across [m]: distance from the axis. along [m]: northward from the equatorial plane. distance [m]: from the centre.
     Gradient of the zonal harmonics to degree 6, with t = along / distance:
     d/dz r^-(n+1) P_n(t) = -(n+1) r^-(n+2) P_n+1(t), and across the axis -across r^-(n+3) P'_n+1(t).
-    Plain arithmetic, for numbers as for arrays: `_kernels` compiles it.
+    Plain arithmetic, for numbers as for arrays: `_strapdown_kernel` compiles it.
     """
     t = along / distance
     t2 = t * t

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from navreplay import _kernels
+from navreplay import _strapdown_kernel
 from navreplay.timeline import Floats, ImuSeries, LogError, Times, Trajectory
 
 __all__ = ["NavState", "Steps", "find_gaps", "idle_steps", "integrate_steps", "make_steps", "mechanise", "split_at_long_gaps"]
@@ -103,7 +103,7 @@ def make_steps(imu: ImuSeries, cut_ns: Times) -> Steps:
     ends = ends[np.diff(ends, prepend=imu.t_ns[0]) > 0]
     k = len(ends)
     steps = Steps(int(imu.t_ns[0]), ends, np.empty(k), np.empty((k, 3)), np.empty((k, 3)), np.empty(k, dtype=np.bool_))
-    _kernels.fill_steps(
+    _strapdown_kernel.fill_steps(
         imu.t_ns, imu.gyro, imu.accel, imu.increments, bridged, ends, steps.dt, steps.dtheta, steps.dvel, steps.bridged
     )
     return steps
@@ -119,7 +119,7 @@ def integrate_steps(steps: Steps, start: NavState) -> Floats:
     """(k, w) packed states at the ends of the steps, from start at the beginning of the first."""
     packed = start.pack()
     states = np.empty((len(steps), len(packed)))
-    _kernels.integrate(packed, steps.dt, steps.dtheta, steps.dvel, states)
+    _strapdown_kernel.integrate(packed, steps.dt, steps.dtheta, steps.dvel, states)
     return states
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from navreplay import _kernels, earth, rotation
+from navreplay import _ned_kernel, _strapdown_kernel, earth, rotation
 from navreplay.strapdown import NavState, integrate_steps, make_steps, mechanise, split_at_long_gaps
 from navreplay.timeline import ImuSeries
 
@@ -86,8 +86,8 @@ def test_kernel_equals_its_python_twin():
     steps = make_steps(imu, NO_CUTS)
     arguments = (start_state().pack(), steps.dt, steps.dtheta, steps.dvel)
     fast, slow = np.empty((20, 28)), np.empty((20, 28))
-    _kernels.integrate(*arguments, fast)
-    _kernels.integrate.py_func(*arguments, slow)
+    _strapdown_kernel.integrate(*arguments, fast)
+    _strapdown_kernel.integrate.py_func(*arguments, slow)
     np.testing.assert_allclose(fast, slow, rtol=1e-13, atol=1e-13)
 
 
@@ -98,7 +98,7 @@ def run_propagate(imu, state, p, interval, nodes, keep=True, tau=None, density=N
     density = np.zeros(n) if density is None else density
     out = np.empty((k, 28)), np.empty((k, n, n)), np.empty((k, n, 0)), np.empty((k * keep, n, n)), np.empty((k * keep, n, n))
     cross = np.empty((n, 0))
-    _kernels.propagate(
+    _ned_kernel.propagate(
         *(state.pack(), p, cross, steps.dt, steps.dtheta, steps.dvel, steps.bridged, np.array(nodes)),
         *(density, tau, interval, *out),
     )
@@ -180,7 +180,7 @@ def test_bridged_gap_widens_the_covariance():
     p = np.diag(np.repeat([1.0, 0.1, 0.01, 1e-3, 0.05], 3) ** 2)
     with_gap = run_propagate(gappy, start_state(), p, 0.05, [180])[1][0]
     without = run_propagate(imu, start_state(), p, 0.05, [200])[1][0]
-    assert with_gap[3, 3] > without[3, 3] + 0.9 * (0.21 * _kernels.BRIDGE_ACCEL) ** 2
+    assert with_gap[3, 3] > without[3, 3] + 0.9 * (0.21 * _ned_kernel.BRIDGE_ACCEL) ** 2
 
 
 def test_long_gaps_split_the_series():

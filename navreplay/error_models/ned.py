@@ -1,7 +1,7 @@
 """Error state in NED: 15 elements, with scale factors 6 more, with a Gauss-Markov gyro error 3 more.
 
-Layout, noise, initial covariance, retraction and propagation. The equations themselves are in `navreplay._kernels`, which also
-states the sign of each element.
+Layout, noise, initial covariance, retraction and propagation. The equations themselves are in `navreplay._ned_kernel`, which
+also states the sign of each element.
 """
 
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from functools import cache
 
 import numpy as np
 
-from navreplay import _kernels, earth, rotation
+from navreplay import _ned_kernel, earth, rotation
 from navreplay.options import ImuNoise
 from navreplay.strapdown import NavState, Steps
 from navreplay.timeline import Floats
@@ -177,7 +177,7 @@ class NedErrorModel:
         packed = state.pack()
         out = Propagated.allocate(len(ends), len(packed), cross, keep)
         part = slice(first, int(ends[-1]))
-        _kernels.propagate(
+        _ned_kernel.propagate(
             packed,
             cov,
             cross,
