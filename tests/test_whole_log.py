@@ -167,6 +167,8 @@ def test_a_trace_has_the_likelihood_of_the_pass(log):
     traced = []
 
     class Watch:
+        traces = 4
+
         def settle(self, options, trace):
             traced.extend(trace(options, Fixed(), ("gyro_noise",)))
             return build_method("em-offline").calibration.settle(options, trace)
