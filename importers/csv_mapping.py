@@ -4,7 +4,6 @@ from fnmatch import fnmatch
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 
 from importers.clock import count_ns, gps_from_gps_unix, is_time, unwrap_weeks
 from importers.csv_ranges import range_columns
@@ -79,6 +78,7 @@ def _read_lines(path: str, mapping: CsvMapping) -> TextTable:
 
 
 def _read_matrix(path: str, mapping: CsvMapping) -> TextTable:
+    import pandas as pd
     from scipy.io import loadmat  # here, because few logs are MATLAB files and it takes a while to import
     from scipy.io.matlab import MatReadError
 
@@ -114,6 +114,8 @@ def _read_times(
     """GPS time of the rows that have one, and which these are."""
     parts = [selection.columns[name] for name in selection.columns if name.startswith("time ")]
     if time.base.startswith("datetime"):
+        import pandas as pd
+
         joined = pd.Series(parts[0] if len(parts) == 1 else [" ".join(pieces) for pieces in zip(*parts, strict=True)])
         stamps = pd.to_datetime(joined, format="mixed", errors="coerce", utc=True)
         timed = stamps.notna().to_numpy()

@@ -5,15 +5,18 @@ separation of the same sentence makes them ellipsoidal.
 """
 
 from datetime import date
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from importers.log import Table
 from importers.rows import NO_FIX, status_codes
 from importers.text_table import parse_text, read_bytes, select_columns
 from navreplay.time_scales import LeapSeconds, gps_from_utc
 from navreplay.timeline import FixStatus, Floats, LogError, Times
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 __all__ = ["NMEA_NOTE", "is_nmea", "read_nmea"]
 
@@ -106,8 +109,10 @@ def _fields(
     chosen: np.ndarray,
     numbers: dict[str, int],
     texts: tuple[int, ...],
-) -> pd.DataFrame:
+) -> "pd.DataFrame":
     """Fields of the chosen sentences; the index is the number of the line."""
+    import pandas as pd
+
     lines = np.flatnonzero(chosen)
     body = b"\n".join(b"%d,%s" % (line, bytes(buffer[starts[line] : ends[line]])) for line in lines)
     text = parse_text(body, delimiter=",", header=False)
@@ -124,12 +129,14 @@ def _seconds_of_day(hhmmss: np.ndarray) -> Floats:
     return np.asarray(whole // 10000 * 3600 + whole // 100 % 100 * 60 + whole % 100)
 
 
-def _date_rows(path: str, lines: np.ndarray, seconds: Floats, rmc: pd.DataFrame, utc_date: date | None) -> Times:
+def _date_rows(path: str, lines: np.ndarray, seconds: Floats, rmc: "pd.DataFrame", utc_date: date | None) -> Times:
     """Days since 1970 (n,) of rows at lines (n,) and seconds of day (n,): from the RMC before each, or counted from a date."""
     dated = rmc[np.isfinite(rmc["date"].to_numpy(dtype=np.float64))]
     if len(dated):
         nearest = np.clip(np.searchsorted(dated.index.to_numpy(), lines, side="right") - 1, 0, None)
         ddmmyy = dated["date"].to_numpy(dtype=np.int64)[nearest]
+        import pandas as pd
+
         parts = pd.DataFrame({"year": 2000 + ddmmyy % 100, "month": ddmmyy // 100 % 100, "day": ddmmyy // 10000})
         day = pd.to_datetime(parts).to_numpy().astype("datetime64[D]").astype(np.int64)
         return np.asarray(
@@ -141,7 +148,7 @@ def _date_rows(path: str, lines: np.ndarray, seconds: Floats, rmc: pd.DataFrame,
     return np.asarray((utc_date - date(1970, 1, 1)).days + midnights, dtype=np.int64)
 
 
-def _positions(gga: pd.DataFrame) -> Floats:
+def _positions(gga: "pd.DataFrame") -> Floats:
     def angle(column: str, letters: int, negative: str) -> Floats:
         """Degrees and minutes, written together, in radians."""
         value = gga[column].to_numpy(dtype=np.float64)
@@ -152,7 +159,7 @@ def _positions(gga: pd.DataFrame) -> Floats:
     return np.column_stack([angle("lat", 3, "S"), angle("lon", 5, "W"), height])
 
 
-def _match_velocities(gga: pd.DataFrame, seconds: Floats, rmc: pd.DataFrame) -> tuple[Floats, Floats]:
+def _match_velocities(gga: "pd.DataFrame", seconds: Floats, rmc: "pd.DataFrame") -> tuple[Floats, Floats]:
     """Velocities (n, 3) NED and covariances of the RMC of the same second of day nearest in the file; NaN without one."""
     vel, cov = np.full((len(gga), 3), np.nan), np.full((len(gga), 3, 3), np.nan)
     valid = rmc[rmc[2] == "A"] if len(rmc) else rmc

@@ -4,7 +4,6 @@ Layout: RTKLIB manual 2.4.2, appendix B.1. A covariance is written as the square
 """
 
 import numpy as np
-import pandas as pd
 
 from importers.clock import gps_from_gps_unix
 from importers.log import Table
@@ -40,6 +39,8 @@ def is_pos(head: str) -> bool:
 
 def read_pos(path: str, leap: LeapSeconds) -> Table:
     """A position file. Raises LogError for baselines, degrees-minutes-seconds, and files without rows."""
+    import pandas as pd
+
     data = read_bytes(path)
     names = _read_names(path, data)
     text = parse_text(data, header=False, comment="%")
@@ -77,6 +78,8 @@ def _read_times(selection: Selection, scale: str, dated: bool, leap: LeapSeconds
         timed = (first >= 0) & (first < _LAST_WEEK) & (second >= 0) & (second < WEEK_S)
         t_ns = gps_from_week_tow(first[timed].astype(np.int64), second[timed])
         return t_ns, timed
+    import pandas as pd
+
     joined = pd.Series(first) + " " + pd.Series(second)
     stamps = pd.to_datetime(joined, format="%Y/%m/%d %H:%M:%S.%f", errors="coerce")
     timed = stamps.notna().to_numpy()

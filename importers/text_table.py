@@ -1,6 +1,7 @@
 """Text files as columns of numbers: fast, and with every line accounted for.
 
 Lines are counted and split with numpy before pandas sees them, so that a damaged line costs itself only and is told.
+Functions of the readers of texts import pandas themselves: it takes half a second, which a log of another kind need not wait.
 """
 
 import csv
@@ -8,19 +9,20 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from navreplay.timeline import LogError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 __all__ = ["Selection", "TextTable", "parse_text", "read_bytes", "select_columns"]
 
 _NEWLINE = 10
 _LAST_BLANK = 32
-# From pandas 3.1 on, numbers are always rounded correctly and the option is deprecated.
-_EXACT_FLOATS = {} if tuple(map(int, pd.__version__.split(".")[:2])) >= (3, 1) else {"float_precision": "round_trip"}
 _HEAD_LINES = 50
 _INT64 = r"[+-]?(\d{1,18}|[1-8]\d{18})"
 
@@ -32,7 +34,7 @@ class TextTable:
     delimiter: the text of the frame, for cells that a double cannot hold."""
 
     names: tuple[str, ...]
-    frame: pd.DataFrame
+    frame: "pd.DataFrame"
     read: int
     rejected: Mapping[str, int]
     lines: bytes = b""
@@ -81,7 +83,7 @@ def parse_text(
         names = tuple(field.strip() for field in _split_fields(head[0], delimiter))
         starts, ends = starts[1:], ends[1:]
     if len(starts) == 0:
-        return TextTable(names, pd.DataFrame(), 0, {})
+        return TextTable(names, _parse_lines(b"", delimiter, 0), 0, {})
     fields = _count_fields(buffer, starts, ends, delimiter)
     expected = int(np.argmax(np.bincount(fields)))
     damaged = _count_marks(np.flatnonzero(buffer == 0), starts, ends) > 0
@@ -104,6 +106,8 @@ def select_columns(
 
     integers: numbers that count nanoseconds; they come out as exact int64, and a line where one is empty is rejected.
     """
+    import pandas as pd
+
     frame = _with_integers(table, [numbers[name] for name in integers if name in numbers])
     if frame.empty:
         empty = {name: np.empty(0) for name in [*numbers, *(texts or {})]}
@@ -123,12 +127,14 @@ def select_columns(
     return Selection(columns, table.read, rejected)
 
 
-def _to_numbers(column: pd.Series, whole: bool) -> np.ndarray:
+def _to_numbers(column: "pd.Series", whole: bool) -> np.ndarray:
+    import pandas as pd
+
     values = pd.to_numeric(column).to_numpy()
     return np.asarray(values, dtype=np.int64 if whole else None if values.dtype.kind in "if" else np.float64)
 
 
-def _with_integers(table: TextTable, indices: Sequence[int]) -> pd.DataFrame:
+def _with_integers(table: TextTable, indices: Sequence[int]) -> "pd.DataFrame":
     """The frame with columns of integers as int64, or as text where they hold anything else: one empty or damaged cell makes
     pandas round the whole column to doubles."""
     rounded = [index for index in indices if index in table.frame and table.frame[index].dtype != np.int64]
@@ -137,7 +143,7 @@ def _with_integers(table: TextTable, indices: Sequence[int]) -> pd.DataFrame:
     texts = _parse_lines(table.lines, table.delimiter, table.frame.shape[1], as_text=True)
     cells = {index: texts[index].str.strip() for index in rounded}
     whole = {index: cell.where(cell.str.fullmatch(_INT64), "x") for index, cell in cells.items()}
-    return table.frame.drop(columns=rounded).join(pd.DataFrame(whole))
+    return table.frame.drop(columns=rounded).join(type(table.frame)(whole))
 
 
 def _split_lines(buffer: NDArray[np.uint8], skip_rows: int, comment: str | None) -> tuple[np.ndarray, np.ndarray]:
@@ -193,9 +199,13 @@ def _join_lines(buffer: NDArray[np.uint8], starts: np.ndarray, ends: np.ndarray)
     return bytes(buffer[np.cumsum(edges[: len(buffer)], dtype=np.int8).astype(bool)])
 
 
-def _parse_lines(lines: bytes, delimiter: str, width: int, as_text: bool = False) -> pd.DataFrame:
+def _parse_lines(lines: bytes, delimiter: str, width: int, as_text: bool = False) -> "pd.DataFrame":
+    import pandas as pd
+
     if not lines:
         return pd.DataFrame()
+    # from 3.1 on, numbers are always rounded correctly and the option is deprecated
+    exact = {} if tuple(map(int, pd.__version__.split(".")[:2])) >= (3, 1) else {"float_precision": "round_trip"}
     return pd.read_csv(
         BytesIO(lines),
         sep=r"\s+" if delimiter == " " else delimiter,
@@ -209,5 +219,5 @@ def _parse_lines(lines: bytes, delimiter: str, width: int, as_text: bool = False
         dtype=str if as_text else None,
         keep_default_na=not as_text,
         encoding_errors="replace",
-        **_EXACT_FLOATS,
+        **exact,
     )

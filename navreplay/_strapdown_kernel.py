@@ -22,6 +22,7 @@ attract = njit(cache=True)(earth.attract)
 
 @njit(cache=True, inline="always")
 def multiply(pw, px, py, pz, qw, qx, qy, qz):
+    """Hamilton product of quaternions, scalar first: as rotations q first, then p."""
     return (
         pw * qw - px * qx - py * qy - pz * qz,
         pw * qx + px * qw + py * qz - pz * qy,
@@ -32,6 +33,7 @@ def multiply(pw, px, py, pz, qw, qx, qy, qz):
 
 @njit(cache=True, inline="always")
 def small_rotation(x, y, z):
+    """Unit quaternion, scalar first, of a rotation vector [rad]."""
     square = x * x + y * y + z * z
     if square < 1e-4:  # sine and cosine of half the angle to beyond double precision
         quarter = square / 4
@@ -46,6 +48,7 @@ def small_rotation(x, y, z):
 
 @njit(cache=True)
 def fill_matrix(w, x, y, z, c):
+    """c (3, 3): rotation matrix of a unit quaternion, scalar first."""
     c[0, 0] = 1 - 2 * (y * y + z * z)
     c[0, 1] = 2 * (x * y - w * z)
     c[0, 2] = 2 * (x * z + w * y)
