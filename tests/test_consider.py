@@ -18,7 +18,7 @@ from navreplay.measurements import Measurement
 from navreplay.metrics import evaluate
 from navreplay.options import ConsiderOptions, FilterOptions, GateOptions
 from navreplay.solution import Solution
-from navreplay.strapdown import NavState, make_steps
+from navreplay.strapdown import Leg, NavState, make_steps
 from navreplay.timeline import LogError, Timeline
 from pipelines.spec import filter_options, validate
 
@@ -97,7 +97,7 @@ def propagate(considered: ConsiderOptions, cov: np.ndarray | None = None):
     start = np.diag(np.append(np.full(15, 1e-6), np.diagonal(model.bias_cov))) if cov is None else cov
     state = NavState.at(log.truth.lla[0], np.array([30.0, 20.0, -3.0]), log.truth.q_nb[0])
     ends = np.arange(50, 501, 50)
-    return model, start, model.propagate(state, start, steps, 0, ends, 0.05, keep=True)
+    return model, start, model.propagate(state, start, Leg(steps, 0, ends, 0.05, keep=True))
 
 
 def test_propagation_is_that_of_states_and_biases_together():
