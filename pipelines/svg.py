@@ -37,7 +37,8 @@ class Layer:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Panel:
-    """A plot of layers. label: of the vertical axis. linear_to: see `Scale`; None for a linear axis."""
+    """A plot of layers. label: of the vertical axis. linear_to: see `Scale`; None for a linear axis, 0 for a logarithmic
+    one."""
 
     label: str
     layers: tuple[Layer, ...]
@@ -86,6 +87,17 @@ def _draw_layer(layer: Layer, across: Scale, up: Scale, x_ordered: bool = True) 
     return f'<path class="{layer.kind} {layer.style}"{title} d="{path}"/>' if path else ""
 
 
+def _log_extent(layers: Iterable[Layer]) -> tuple[float, float]:
+    """What a logarithmic axis must show: every point, and never less than a factor of four."""
+    values = np.concatenate([np.zeros(0), *(layer.y for layer in layers)])
+    known = values[np.isfinite(values) & (values > 0)]
+    if not len(known):
+        return 0.1, 10.0
+    low, high = float(known.min()), float(known.max())
+    margin = max((high / low) ** 0.06, 2 * (low / high) ** 0.5, 1.0)
+    return low / margin, high * margin
+
+
 def _extent(layers: Iterable[Layer]) -> tuple[float, float]:
     """What the vertical axis must show: every point, and of bands what 98 % of them need."""
     lows, highs = [], []
@@ -109,7 +121,7 @@ def _number(value: float) -> str:
 
 
 def _draw_panel(panel: Panel, across: Scale, shades: Sequence[tuple[float, float]], top: float, tall: float) -> str:
-    low, high = _extent(panel.layers)
+    low, high = _extent(panel.layers) if panel.linear_to != 0 else _log_extent(panel.layers)
     up = Scale(low, high, tall, panel.linear_to)
     parts = []
     for tick in up.ticks(min(5, max(2, round(tall / 20)))):

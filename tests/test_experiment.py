@@ -215,7 +215,7 @@ def test_files(tmp_path):
     assert set(paths) == {"experiment.json", "experiment.md", "experiment.html"}
     report = json.loads(paths["experiment.json"].read_text())
     assert report["schema"] == "navreplay experiment 1"
-    assert "| fixed | 3 ± 12.7 |" in paths["experiment.md"].read_text()
+    assert "| fixed | 3 ± 13 |" in paths["experiment.md"].read_text()
     html = paths["experiment.html"].read_text()
     assert html.count('<svg class="plot time"') == 2
     assert "published, end" in html
@@ -238,6 +238,10 @@ def test_every_experiment_names_what_it_has():
         for row in experiment.published_noise:
             assert row.arm in labels
             assert row.stretch in stretches
+        for promise in (*experiment.ratios, *experiment.accepted):
+            assert {promise.arm, promise.reference} <= labels
+            assert promise.stretch in stretches
+            assert promise.quantity in names
 
 
 def test_the_moment_oracle_is_told_second_moments_and_means():

@@ -16,7 +16,7 @@ from pipelines.report import build_report, dump_json
 from pipelines.report_tables import headline_figures, report_tables
 from pipelines.result import RunResult
 from pipelines.sections import OutputSection
-from pipelines.table import figure_text
+from pipelines.table import figure_text, interval_text
 from tests.sample_drive import make_result, make_solution
 
 NASTY = "/gps/<script>alert('x')</script>|&"
@@ -181,6 +181,23 @@ def test_headline_and_tables_tell_the_same_as_json(result: RunResult) -> None:
 )
 def test_figures_have_three_digits(value: float | None, text: str) -> None:
     assert figure_text(value, "m") == (text if value is not None else "–")
+
+
+@pytest.mark.parametrize(
+    ("mean", "half_width", "text"),
+    [
+        (0.406, 0.00598, "0.4060 ± 0.0060"),
+        (259.4, 46.38, "259 ± 46"),
+        (1.0, None, "1"),
+        (None, None, "–"),
+        (2.0, 0.0, "2"),
+        (0.3, 12.7, "0 ± 13"),
+        (3.41e-5, 2.2e-6, "3.41e-05 ± 2.2e-06"),
+        (1455.0, 3039.0, "1500 ± 3000"),
+    ],
+)
+def test_means_are_told_as_far_as_their_interval_reaches(mean, half_width, text):
+    assert interval_text(mean, half_width) == text
 
 
 def test_comparison_has_a_row_per_method_in_every_table(tmp_path: Path) -> None:
