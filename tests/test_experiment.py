@@ -12,7 +12,19 @@ from navreplay.adapt.iae import Iae
 from navreplay.filters.core import Gaussian, Innovation
 from navreplay.timeline import LogError
 from pipelines.cli import main
-from pipelines.experiment import Arm, ArmOutcome, NoiseClaim, Outcome, Published, Stretch, run_experiment, run_seed
+from pipelines.experiment import (
+    Arm,
+    ArmOutcome,
+    ConsistencyClaim,
+    NoiseClaim,
+    Outcome,
+    Published,
+    RatioClaim,
+    Stretch,
+    run_experiment,
+    run_seed,
+)
+from pipelines.experiment_promises import judge_consistency, judge_promises, tell_consistency, tell_promises
 from pipelines.experiment_report import write_experiment
 from pipelines.experiment_summary import published_orders, rmse_figures, summarise_experiment
 from pipelines.experiments import EXPERIMENTS
@@ -336,3 +348,33 @@ def test_command_lists_and_refuses(capsys, tmp_path):
     assert "the nearest is 'ermakf-city'" in capsys.readouterr().err
     assert main(["experiment", "ermakf-city"]) == 1
     assert "name the folder for the results with -o" in capsys.readouterr().err
+
+
+def test_promises_are_kept_broken_undecided_or_only_told():
+    figures = {
+        "auto": {"end": {"position": np.array([1.0, 1.1, 0.9])}},
+        "oracle": {"end": {"position": np.array([1.0, 1.0, 1.0])}},
+    }
+
+    def interval(values):
+        return {"mean": float(values.mean()), "half_width": 0.2, "seeds": 3}
+
+    limits = (2.0, 0.5, 1.1, None)
+    claims = [RatioClaim("end", "position", "auto", "oracle", most) for most in limits]
+    judged = judge_promises(claims, figures, interval)
+    assert [one["verdict"] for one in judged] == ["kept", "broken", "undecided", None]
+    told = tell_promises(judged)
+    assert told[0].startswith("The position error of auto is 1.000 ± 0.200 times that of oracle in 'end'; that it is at most 2")
+    assert told[3].endswith("of oracle in 'end'.")
+
+
+def test_consistency_is_accepted_from_nine_tenths_on():
+    def arm(share):
+        return {"stretches": {"end": {"nees": {"position": {"mean": 3.0, "share_inside": share}}}}}
+
+    arms = {"auto": arm(0.9), "fixed": arm(0.89), "oracle": arm(0.95)}
+    claims = [ConsistencyClaim("end", "position", label, "oracle") for label in ("auto", "fixed")]
+    claims.append(ConsistencyClaim("end", "gyro bias", "auto", "oracle"))
+    judged = judge_consistency(claims, arms)
+    assert [one["verdict"] for one in judged] == ["kept", "broken"]
+    assert "89 % of the epochs are inside their bounds (oracle: 95 %)" in tell_consistency(judged)[1]
