@@ -239,15 +239,12 @@ def experiment_plots(experiment: Experiment, outcomes: Sequence[Outcome], report
     shades = tuple(window for stretch in experiment.stretches for window in stretch.windows)
     count = len(outcomes)
     errors = draw_time_panels(_error_panels(experiment, outcomes, styles), duration, shades)
-    plots = [
-        Plot("Errors", f"Root mean square over {count} seeds of the 3-D errors; stretches shaded.", legend, errors),
-        *draw_means(report),
-    ]
+    plots = [Plot("Errors", f"Root mean square over {count} seeds of the 3-D errors; stretches shaded.", legend, errors)]
     noise = _noise_panels(outcomes, styles, duration)
     if noise:
         note = f"Median over {_NOISE_BIN_S:g} s and all seeds of the variance used over the true one; 1 is right."
         plots.append(Plot("R used over R true", note, legend, draw_time_panels(noise, duration, shades)))
-    return (*plots, *_weight_plots(experiment, outcomes, shades))
+    return (*plots, *draw_means(report), *_weight_plots(experiment, outcomes, shades))
 
 
 def _weight_plots(experiment: Experiment, outcomes: Sequence[Outcome], shades: tuple[tuple[float, float], ...]) -> list[Plot]:
