@@ -293,11 +293,20 @@ def test_smoothing_is_refused(log):
         run_filter(log.timeline(), build_method("eckf"), options(smooth=True))
 
 
-def test_a_method_that_calibrates_first_is_refused(log):
+def test_a_bank_is_refused(log):
     with pytest.raises(
-        LogError, match=r"consider parameters need a single filter .* 'em-offline' is not; set consider.every_method"
+        LogError, match=r"consider parameters need a single linearised filter, which 'mmae' is not; set consider"
     ):
-        run_filter(log.timeline(), build_method("em-offline"), options(consider=replace(ALL_BIASES, every_method=True)))
+        run_filter(log.timeline(), build_method("mmae"), options(consider=replace(ALL_BIASES, every_method=True)))
+
+
+@pytest.mark.parametrize("name", ["em-offline", "auto"])
+def test_a_method_that_calibrates_finds_the_noise_without_biases_and_reckons_with_them_after(log, name):
+    without = run_filter(log.timeline(), build_method(name), options())
+    biases = replace(NOTHING, position_bias=(2.0, 2.0, 3.0), every_method=True)
+    solution = run_filter(log.timeline(), build_method(name), options(consider=biases))
+    assert solution.estimated == without.estimated
+    assert (solution.std[-1, :3] > [1.9, 1.9, 2.9]).all()
 
 
 def test_the_configuration_names_biases_with_units():

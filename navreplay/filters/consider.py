@@ -158,10 +158,10 @@ def set_up(aiding: Aiding, model: ErrorModel, method: Method, options: FilterOpt
             f"filter: '{method.name}' considers biases that it does not estimate, and such a solution cannot be smoothed; set "
             "filter.smooth = false, or take a method without consider parameters"
         )
-    if not isinstance(method.rule, Linearised) or method.calibration is not None or method.weighting is not None:
+    if not isinstance(method.rule, Linearised) or method.weighting is not None:
         raise LogError(
-            "filter: consider parameters need a single filter that goes over the log once, which "
-            f"'{method.name}' is not; set consider.every_method = false, or take 'eckf'"
+            f"filter: consider parameters need a single linearised filter, which '{method.name}' is not; set "
+            "consider.every_method = false, or take 'eckf'"
         )
     considered = ConsideredModel.of(model, options.consider)
     rule = Schmidt(method.rule, model.size, np.diagonal(considered.bias_cov))

@@ -52,7 +52,8 @@ def run_filter(timeline: Timeline, method: Method, options: FilterOptions, progr
 
         settled = method.calibration.settle(options, trace)
         progress = next(shares)
-    solution = _run_passes(timeline, replace(method, adapter=settled.adapter), settled.options, None, progress)
+    method = replace(method, adapter=settled.adapter, calibration=None)
+    solution = _run_passes(timeline, method, settled.options, None, progress)
     told = tuple(Event(int(solution.t_ns[0]), "info", note) for note in settled.notes)
     return replace(solution, estimated=settled.estimated, events=told + solution.events)
 
