@@ -27,7 +27,7 @@ class Setting:
     value: object = None
 
     def __str__(self) -> str:
-        value = self.value if isinstance(self.value, str) else json.dumps(self.value, default=str)
+        value = self.value if isinstance(self.value, str) else json.dumps(self.value)
         return f"{self.key.rpartition('.')[2]} {value}"
 
 

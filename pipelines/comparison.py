@@ -106,8 +106,9 @@ def overview_table(report: Report) -> Table:
     outages = any(method["outages"]["summary"]["end_horizontal"]["count"] for method in methods.values())
     columns = {label: _headline_columns(method, "outside" if outages else "all") for label, method in methods.items()}
     heads = next(iter(columns.values()))
-    rows = tuple((label, *(figure_text(figures[head]) for head in heads)) for label, figures in columns.items())
-    note = f"Errors are RMS, {_STRETCHES['outside' if outages else 'all']}; NEES over its expected value: 1 is right."
+    rows = tuple((label, *(figure_text(figures.get(head)) for head in heads)) for label, figures in columns.items())
+    stretch = "outside outages, which last until a fix is used again" if outages else "whole drive"
+    note = f"Errors are RMS, {stretch}; NEES over its expected value: 1 is right."
     return Table("Overview", ("method", *heads), rows, note)
 
 
@@ -117,13 +118,13 @@ def _headline_columns(method: Mapping[str, Any], stretch: str) -> dict[str, floa
     columns: dict[str, float | None] = {}
     for quantity, component in _HEADLINES.items():
         if quantity in errors:
-            columns[f"{quantity} {component.replace('3d', '3-D')} [{errors[quantity]['unit']}]"] = errors[quantity][component][
-                "rms"
-            ]
+            table = errors[quantity]
+            columns[f"{quantity} {component.replace('3d', '3-D')} [{table['unit']}]"] = table[component]["rms"]
     if stretch == "outside":
         columns["outage end, horizontal median [m]"] = method["outages"]["summary"]["end_horizontal"]["p50"]
     nees = method["nees"]["position"]
     columns["position NEES"] = None if nees["mean"] is None else nees["mean"] / nees["dof"]
+    columns["epochs"] = errors["position"]["3d"]["count"]
     return columns
 
 

@@ -193,6 +193,8 @@ def test_values_may_be_words_or_lists(log: Path, tmp_path: Path, capsys: pytest.
     more = ["--filters", "fixed", "--json", "--vary"]
     assert cli.main(arguments_of(log, tmp_path / "words", *more, "imu.grade=consumer,tactical")) == 0
     assert [row["value"] for row in json.loads(capsys.readouterr().out)["methods"]] == ["consumer", "tactical"]
+    assert cli.main(arguments_of(log, tmp_path / "endless", *more, "imu.gyro_bias_tau_s=100,inf")) == 0
+    assert [row["label"] for row in json.loads(capsys.readouterr().out)["methods"]][1] == "fixed, gyro_bias_tau_s inf"
     assert cli.main(arguments_of(log, tmp_path / "lists", *more, "gnss.default_velocity_std_mps=[0.1, 0.2],[1, 2]")) == 0
     labels = [row["label"] for row in json.loads(capsys.readouterr().out)["methods"]]
     assert labels == ["fixed, default_velocity_std_mps [0.1, 0.2]", "fixed, default_velocity_std_mps [1, 2]"]

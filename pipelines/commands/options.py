@@ -35,13 +35,22 @@ def read_settings(arguments: argparse.Namespace) -> tuple[Setting, ...]:
         raise LogError(f"--vary {key}: the logs are read once for all runs, so no key of [input] can vary; compare runs apart")
     if key == "filter.name":
         raise LogError("--vary filter.name: the methods are named with --filters")
-    sets = [f"{key}={json.dumps(value, default=str)}" for value in values]
+    sets = [f"{key}={json.dumps(value)}" for value in values]
     return tuple(Setting(read_config(arguments, [one]), key, value) for one, value in zip(sets, values, strict=True))
 
 
 def _split_values(text: str) -> list[object]:
     """The values in a list with commas: as TOML has them, or strings without quotes."""
     try:
-        return list(tomllib.loads(f"values = [{text}]")["values"])
+        return [_as_json(value) for value in tomllib.loads(f"values = [{text}]")["values"]]
     except tomllib.TOMLDecodeError:
         return [value.strip() for value in text.split(",") if value.strip()]
+
+
+def _as_json(value: object) -> object:
+    """The value if JSON can hold it; else (inf, a date) its text, which a configuration takes as well."""
+    try:
+        json.dumps(value, allow_nan=False)
+    except (TypeError, ValueError):
+        return str(value)
+    return value
