@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from math import floor, log10
 
-__all__ = ["Figure", "Table", "figure_text", "interval_text"]
+__all__ = ["Figure", "Table", "figure_text", "interval_text", "table_lines"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +41,16 @@ def interval_text(mean: float | None, half_width: float | None, unit: str = "") 
         return f"{mean:.{max(places + floor(log10(abs(mean or half_width))), 0)}e} ± {half_width:.1e} {unit}".strip()
     shown = max(places, 0)
     return f"{mean:.{shown}f} ± {half_width:.{shown}f} {unit}".strip()
+
+
+def table_lines(table: Table) -> list[str]:
+    """Header and rows as lines of equal columns, the first to the left and the figures to the right."""
+    rows = (table.header, *table.rows)
+    widths = [max(len(row[i]) for row in rows) for i in range(len(table.header))]
+    return [
+        "  ".join([row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))])
+        for row in rows
+    ]
 
 
 def figure_text(value: float | None, unit: str = "") -> str:
