@@ -3,10 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from navreplay.timeline import Floats
 
-__all__ = ["Scale", "log_ticks", "nice_ticks", "thin_band", "thin_line", "time_label", "time_ticks"]
+__all__ = ["Scale", "find_breaks", "log_ticks", "nice_ticks", "thin_band", "thin_line", "time_label", "time_ticks"]
 
 _TIME_STEPS = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 28800, 86400)
 
@@ -81,6 +82,15 @@ def time_label(seconds: float) -> str:
     minutes, second = divmod(int(seconds), 60)
     hours, minute = divmod(minutes, 60)
     return f"{hours}:{minute:02d}:{second:02d}" if hours else f"{minutes}:{second:02d}"
+
+
+def find_breaks(x: Floats) -> NDArray[np.intp]:
+    """Indices of what begins behind a gap in rising x (n,): ten usual spacings and a hundredth of the whole. No line should
+    lead across it."""
+    steps = np.diff(x)
+    if len(steps) < 2:
+        return np.empty(0, dtype=np.intp)
+    return np.flatnonzero(steps > max(10 * float(np.median(steps)), float(x[-1] - x[0]) / 100)) + 1
 
 
 def thin_line(x: Floats, y: Floats, bins: int = 700) -> tuple[Floats, Floats]:

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from navreplay.timeline import Floats
-from pipelines.scales import Scale, nice_ticks, thin_band, thin_line, time_label, time_ticks
+from pipelines.scales import Scale, find_breaks, nice_ticks, thin_band, thin_line, time_label, time_ticks
 
 __all__ = ["SKY_HEIGHT", "Layer", "Panel", "draw_map", "draw_sky", "draw_time_panels", "map_height"]
 
@@ -75,8 +75,11 @@ def _draw_layer(layer: Layer, across: Scale, up: Scale, x_ordered: bool = True) 
     if layer.kind == "line" and not x_ordered:
         return f'<path class="line {layer.style}" d="{_trace(across.place(layer.x), down(layer.y))}"/>'
     if layer.kind == "line":
-        x, y = thin_line(layer.x, layer.y)
-        return f'<path class="line {layer.style}"{title} d="M{_points(across.place(x), down(y))}"/>' if len(x) else ""
+        known = np.isfinite(layer.x) & np.isfinite(layer.y)
+        pieces = np.split(np.flatnonzero(known), find_breaks(layer.x[known]))
+        thinned = (thin_line(layer.x[piece], layer.y[piece]) for piece in pieces if len(piece))
+        path = "".join([f"M{_points(across.place(x), down(y))}" for x, y in thinned])
+        return f'<path class="line {layer.style}"{title} d="{path}"/>' if path else ""
     known = np.flatnonzero(np.isfinite(layer.x) & np.isfinite(layer.y))
     known = known[:: len(known) // _MOST_DOTS + 1]
     px, py = across.place(layer.x[known]).tolist(), down(layer.y[known]).tolist()

@@ -1,5 +1,7 @@
 """Scales, ticks and thinning of the plots."""
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,7 +9,7 @@ from hypothesis import strategies as st
 
 from pipelines.mean_figures import draw_means
 from pipelines.plot import bend_of
-from pipelines.scales import Scale, log_ticks, nice_ticks, thin_band, thin_line, time_label, time_ticks
+from pipelines.scales import Scale, find_breaks, log_ticks, nice_ticks, thin_band, thin_line, time_label, time_ticks
 from pipelines.svg import Layer, Panel, draw_map, draw_time_panels
 
 
@@ -117,3 +119,13 @@ def test_mean_figures_draw_every_arm_and_what_was_published() -> None:
     assert "&lt;b&gt;" in plot.svg
     assert plot.svg.count("crosses bad") == 1
     assert "published" in [name for _, name in plot.legend]
+
+
+def test_no_line_leads_across_a_gap() -> None:
+    x = np.concatenate([np.arange(0.0, 50.0, 0.2), np.arange(90.0, 140.0, 0.2)])
+    np.testing.assert_array_equal(find_breaks(x), [250])
+    assert len(find_breaks(np.arange(5.0))) == 0
+    drawing = draw_time_panels([Panel("error", (Layer("line", x, np.sin(x), "c1", "error"),))], 140.0)
+    path = re.search(r'class="line c1"[^>]* d="([^"]*)"', drawing)
+    assert path is not None
+    assert path[1].count("M") == 2
