@@ -61,7 +61,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--scenarios", default=",".join(SCENARIO_NAMES))
-    parser.add_argument("--filters", default=",".join(name for name in PRESETS if name != "ml-ga"))
+    parser.add_argument("--filters", default=",".join(name for name in PRESETS if not name.endswith("-ga")))
     arguments = parser.parse_args()
     for scenario in arguments.scenarios.split(","):
         print_table(scenario, ["oracle", *arguments.filters.split(",")], arguments.seeds)
