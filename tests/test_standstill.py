@@ -15,7 +15,7 @@ from navreplay.metrics import evaluate
 from navreplay.options import GRADES, FilterOptions, GateOptions, VehicleOptions
 from navreplay.standstill import find_standstills
 from navreplay.strapdown import NavState
-from navreplay.timeline import GnssFixSeries, ImuSeries
+from navreplay.timeline import GnssFixSeries, ImuSeries, Timeline
 from synthetic_logs import SCENARIOS, simulate, truth_at, with_duration
 
 SECOND = 1_000_000_000
@@ -121,6 +121,13 @@ def test_an_outage_over_a_stop_does_less_harm(log, smooth):
             assert velocity.nees.mean() < 6
         gains.append(errors[1] / errors[0])
     assert np.mean(gains) < 0.6
+
+
+def test_without_an_imu_it_is_told_that_nothing_comes_of_it():
+    drive = simulate(with_duration(SCENARIOS["ranges-open"], 30.0), 1)
+    alone = Timeline(ranges=drive.ranges, fix_lever_b=drive.timeline().fix_lever_b)
+    solution = run_filter(alone, build_method("fixed"), FilterOptions(vehicle=STANDING))
+    assert any("zero_velocity is not used" in event.text for event in solution.events)
 
 
 @pytest.mark.parametrize("name", PRESETS)

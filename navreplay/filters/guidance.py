@@ -76,6 +76,9 @@ def choose_guidance(timeline: Timeline, options: FilterOptions, recorder: Record
         if attitude is None or options.use not in ("auto", "attitudes"):
             raise _nothing_to_use(options)
         alone = AttitudeAiding(attitude, model, options.attitude)
+        if options.vehicle.zero_velocity:
+            text = "vehicle.zero_velocity is not used: without fixes nothing tells which IMU noise is that of standstill"
+            recorder.tell(int(timeline.imu.t_ns[0]), "warning", text)
         return Guidance(alone, (), alone, model)
     others: list[AttitudeAiding | StandstillAiding] = []
     if attitude is not None:

@@ -122,6 +122,10 @@ def _choose_ranges_alone(timeline: Timeline, options: FilterOptions, recorder: R
         "its roll and pitch are unknown"
     )
     recorder.tell(int(timeline.ranges.t_ns[0]), "warning", text)
+    if options.vehicle.zero_velocity:
+        recorder.tell(
+            int(timeline.ranges.t_ns[0]), "warning", "vehicle.zero_velocity is not used: standstill is told by an IMU"
+        )
     return RangeAiding(timeline.ranges, timeline.fix_lever_b, None, options, recorder)
 
 
