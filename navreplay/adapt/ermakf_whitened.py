@@ -10,11 +10,10 @@ could learn more from correlated measurements than this R lets them.
 """
 
 from dataclasses import dataclass
-
-import numpy as np
+from math import exp
 
 from navreplay.adapt.ermakf_derived import ErmakfDerived
-from navreplay.timeline import Floats
+from navreplay.adapt.lag_curve import Correlation
 
 __all__ = ["ErmakfWhitened"]
 
@@ -23,6 +22,6 @@ __all__ = ["ErmakfWhitened"]
 class ErmakfWhitened(ErmakfDerived):
     """Parameters as of `ErmakfDerived`."""
 
-    def _weigh(self, variance: Floats, time_constant: Floats) -> Floats:
-        rho = np.exp(-1 / time_constant)
-        return np.asarray(variance * (1 + rho) / (1 - rho))
+    def _enlarge(self, correlation: Correlation, interval: float) -> float:
+        rho = exp(-interval / correlation.time)
+        return 1 - correlation.share + correlation.share * (1 + rho) / (1 - rho)
