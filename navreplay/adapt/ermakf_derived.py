@@ -27,8 +27,8 @@ def estimate_ratios(
     curve = fit_curve((trust @ sums) / np.maximum(trust @ weights, _LEAST), pooled)
     own, share = fit_levels(sums / np.maximum(weights, _LEAST), weights, curve)
     count = share * independent_values(curve.correlation, weights.max(axis=1), interval)
-    common = (freedom + count.sum() * curve.variance) / (freedom + count.sum())
-    return (freedom * common + count * own) / (freedom + count - 2), curve.correlation
+    common = (freedom + count.sum() * curve.variance * freedom / (freedom - 2)) / (freedom + count.sum())
+    return ((freedom - 2) * common + count * own) / (freedom - 2 + count), curve.correlation
 
 
 _LEAST = 1e-12
@@ -54,7 +54,8 @@ class ErmakfDerived:
         memory = extend_memory(state, innovation, self.window, self.longest_step)
         here = rows_of(memory, innovation.labels)
         kinds = _rows_by_kind(innovation.labels)
-        before = _guess_new(memory.ratio[here], kinds)
+        remembered = memory.weights.sum(axis=(0, 2))[here] > 0
+        before = _guess_new(np.where(remembered, memory.ratio[here], np.nan), kinds)
         squares, shares = level_squares(innovation, np.diagonal(innovation.noise) * before)
         memory = add_levels(memory, here, squares, shares, before, interval)
         sums, weights = memory.sums.sum(axis=0)[here], memory.weights.sum(axis=0)[here]

@@ -57,7 +57,7 @@ def fit_curve(curve: Floats, weights: Floats) -> Curve:
     both, right, right_drift = _SHAPES @ (weights * _DRIFT), _SHAPES @ (weights * curve), float(weights @ (_DRIFT * curve))
     drift = (shape2 * right_drift - both * right) / np.maximum(shape2 * drift2 - both**2, _LEAST)
     drift = np.clip(drift, 0.0, right_drift / max(drift2, _LEAST))
-    variance = np.maximum(right - both * drift, 0.0) / shape2
+    variance = np.maximum(right - both * drift, 0.0) / np.maximum(shape2, _LEAST)
     best = int((((curve - variance[:, None] * _SHAPES - drift[:, None] * _DRIFT) ** 2) @ weights).argmin())
     return Curve(float(variance[best]), float(drift[best]), _GRID[best])
 

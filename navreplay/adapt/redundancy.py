@@ -7,8 +7,11 @@ integrity monitoring (Sturza, Navigation 35 (1988) 483), in which no error of th
 correlated noise for white believes itself too much, by several of its sigmas: a is the square of how many are allowed for.
 """
 
+from functools import lru_cache
+
 import numpy as np
 
+from navreplay.adapt.trails import CLOCKED
 from navreplay.filters.core import Innovation, solve
 from navreplay.timeline import Floats
 
@@ -16,12 +19,24 @@ __all__ = ["level_squares"]
 
 _DOUBT = 100.0
 """a: the state may be off by ten of the filter's sigmas."""
+_CLOCK = 1e6
+"""Variance [m^2, m^2/s^2] added for a receiver clock of which nothing is known."""
 
 
 def level_squares(innovation: Innovation, variance: Floats) -> tuple[Floats, Floats]:
     """Squares (m,) of e under noise of variance (m,), and their expectations (m,): the share of redundancy, from 0 where
-    nothing is left to compare with to 1."""
-    std, unit = np.sqrt(variance), np.eye(len(variance))
-    left = solve(unit + _DOUBT * (innovation.spread / np.outer(std, std)), unit)
-    off = left @ (innovation.residual / std)
-    return off**2, np.diagonal(left) / _DOUBT + (1 - 1 / _DOUBT) * (left**2).sum(axis=1)
+    nothing is left to compare with to 1. Both are zero of what no receiver clock is in."""
+    std, clock = np.sqrt(variance), _same_clock(innovation.labels)
+    spread = (_DOUBT * innovation.spread + _CLOCK * clock) / np.outer(std, std)
+    unit = np.eye(len(std))
+    left = solve(unit + spread, unit)
+    off, judged = left @ (innovation.residual / std), np.diagonal(clock)
+    return judged * off**2, judged * (np.diagonal(left) / _DOUBT + (1 - 1 / _DOUBT) * (left**2).sum(axis=1))
+
+
+@lru_cache(maxsize=64)
+def _same_clock(labels: tuple[str, ...]) -> Floats:
+    """(m, m) one where two labels share what the receiver clock adds to them."""
+    kinds = [next((i for i, kind in enumerate(CLOCKED) if label.startswith(kind)), -1) for label in labels]
+    kind = np.array(kinds)
+    return np.asarray((kind[:, None] == kind) & (kind >= 0), dtype=np.float64)

@@ -17,9 +17,9 @@ import numpy as np
 from navreplay.filters.core import Innovation
 from navreplay.timeline import Floats
 
-__all__ = ["Trail", "Trails", "difference_steps", "extend_trails", "remove_common", "stack_trails"]
+__all__ = ["CLOCKED", "Trail", "Trails", "difference_steps", "extend_trails", "remove_common", "stack_trails"]
 
-_CLOCKED = ("range ", "range_rate ")
+CLOCKED = ("range ", "range_rate ")
 _LEAST_SHARED = 4
 
 
@@ -45,7 +45,7 @@ def remove_common(labels: tuple[str, ...], values: Floats, variances: Floats) ->
     is left is stretched to the variance that it had with its own share in the mean.
     """
     result = values.copy()
-    for kind in _CLOCKED:
+    for kind in CLOCKED:
         rows = [i for i, label in enumerate(labels) if label.startswith(kind) and values[i] == values[i]]
         if len(rows) >= _LEAST_SHARED:
             result[rows] = _centre(values[rows], variances[rows])
