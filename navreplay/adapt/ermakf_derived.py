@@ -1,4 +1,24 @@
-"""TODO"""
+"""Redundant-measurement filter for noise that is correlated in time: what ERMAKF means to be, derived.
+
+Source: own derivation from the differences of Ge et al., Sensors 20 (2020) 6041, (12)-(14). Differences over one epoch add up
+to those over a lag L, in which the INS is still never differenced across a correction; half their mean square is v_L
+(`lag_memory`). What lasts longer than the lags is in no difference: it is in the level, the part of the innovations in which
+satellites contradict each other (`redundancy`). The curve of v_L and level says how large noise is, which share of it is
+correlated, and for how long (`lag_curve`).
+That curve is shared by all components of a kind (all pseudoranges, all range rates), since the surroundings make it; each has
+a variance of its own. Noise that lasts T has window / T independent values in a window, hence few, so variances are taken for
+inverse-gamma distributed about that of the kind, and the kind's about the told one: with n values of mean square s^2, and a
+belief in c that counts as b, R = (b c + n s^2) / (b + n). A satellite that is new has the R of its surroundings, and R leaves
+the told one by as much as there are independent values that speak against it. The kind's scale is the maximum-likelihood one
+of the t-distribution with b + 2 degrees of freedom that this makes of single values, whose weights are
+inverse to R (Lange, Little, Taylor, J. Am. Stat. Assoc. 84 (1989) 881), so that one bad satellite does not speak for all;
+one iteration of it is done per epoch.
+Assumes: noise of one correlation in all components of a kind, and told variances that are right relative to each other.
+Fails: where a bias is common to satellites (heights under an atmosphere unlike its model); with four satellites or fewer,
+and on position fixes, which show no level: time constants beyond the longest lag are then not seen; and for half a window
+after noise has changed. R says how large the errors are, not that they stay: a filter that takes correlated noise for white
+still believes their mean.
+"""
 
 from dataclasses import dataclass
 
@@ -6,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navreplay.adapt.adapter import Adaptation
-from navreplay.adapt.lag_curve import Correlation, fit_curve, fit_levels, independent_values
+from navreplay.adapt.lag_curve import Correlation, fit_curve, fit_variances, independent_values
 from navreplay.adapt.lag_memory import LagMemory, add_levels, extend_memory, forget, rows_of
 from navreplay.adapt.ratio import scale_noise
 from navreplay.adapt.redundancy import level_squares
@@ -16,31 +36,36 @@ from navreplay.timeline import Floats
 __all__ = ["ErmakfDerived", "estimate_ratios"]
 
 
-def estimate_ratios(
-    sums: Floats, weights: Floats, before: Floats, freedom: float, interval: float
-) -> tuple[Floats, Correlation]:
-    """Ratios (k,) to the told variance of components of one kind, and the correlation they share, from sums and weights
-    (k, lags + 1) of a memory with epochs interval [s] apart. before (k,): the ratios estimated so far. freedom: degrees of
-    freedom of what is believed beforehand."""
-    trust = before.mean() / before
-    pooled = weights.sum(axis=0)
-    curve = fit_curve((trust @ sums) / np.maximum(trust @ weights, _LEAST), pooled)
-    own, share = fit_levels(sums / np.maximum(weights, _LEAST), weights, curve)
-    count = share * independent_values(curve.correlation, weights.max(axis=1), interval)
-    common = (freedom + count.sum() * curve.variance * freedom / (freedom - 2)) / (freedom + count.sum())
-    return ((freedom - 2) * common + count * own) / (freedom - 2 + count), curve.correlation
-
-
 _LEAST = 1e-12
+_SHORTEST_STEP = 1e-3
+
+
+def estimate_ratios(
+    sums: Floats, weights: Floats, before: Floats, belief: float, interval: float
+) -> tuple[Floats, Correlation]:
+    """Ratios (k,) to the told variance of components of one kind, and the correlation they share.
+
+    sums, weights (k, lags + 1): of a memory with epochs interval [s] apart. before (k,): the ratios estimated so far. belief:
+    how many values what is believed of a component counts as.
+    """
+    trust = before.mean() / before
+    curve = fit_curve((trust @ sums) / np.maximum(trust @ weights, _LEAST), weights.sum(axis=0))
+    own, share = fit_variances(sums / np.maximum(weights, _LEAST), weights, curve)
+    count = share * independent_values(curve.correlation, weights.max(axis=1), interval)
+    freedom, total = belief + 2, count.sum()
+    mean = curve.variance * freedom / belief  # of the inverse-gamma distribution with that scale
+    common = (freedom + total * mean) / (freedom + total)
+    return (belief * common + count * own) / (belief + count), curve.correlation
 
 
 @dataclass(frozen=True, slots=True)
 class ErmakfDerived:
-    """window [s]: of what is remembered. freedom: degrees of freedom, above 2, of what is believed beforehand. longest_step
-    [s]: no difference over one epoch reaches further. floor: least ratio of used to told variance."""
+    """window [s]: of what is remembered. belief: how many independent values of its own noise a component needs to count as
+    much as its surroundings. longest_step [s]: no difference over one epoch reaches further. floor: least ratio of estimated to
+    told variance."""
 
     window: float = 30.0
-    freedom: float = 4.0
+    belief: float = 2.0
     longest_step: float = 1.5
     floor: float = 0.01
 
@@ -50,7 +75,8 @@ class ErmakfDerived:
 
     def adapt(self, state: LagMemory, prior: Gaussian, innovation: Innovation) -> Adaptation[LagMemory]:
         """R scaled by the variance estimated for each component."""
-        interval = min((innovation.t_ns - state.t_ns) / 1e9, self.longest_step)
+        elapsed = (innovation.t_ns - state.t_ns) / 1e9 if state.rows else self.longest_step
+        interval = min(max(elapsed, _SHORTEST_STEP), self.longest_step)
         memory = extend_memory(state, innovation, self.window, self.longest_step)
         here = rows_of(memory, innovation.labels)
         kinds = _rows_by_kind(innovation.labels)
@@ -61,7 +87,7 @@ class ErmakfDerived:
         sums, weights = memory.sums.sum(axis=0)[here], memory.weights.sum(axis=0)[here]
         ratio, used = np.empty(len(here)), np.empty(len(here))
         for rows in kinds:
-            found, correlation = estimate_ratios(sums[rows], weights[rows], before[rows], self.freedom, interval)
+            found, correlation = estimate_ratios(sums[rows], weights[rows], before[rows], self.belief, interval)
             ratio[rows] = np.maximum(found, self.floor)
             used[rows] = ratio[rows] * self._enlarge(correlation, interval)
         known = memory.ratio.copy()

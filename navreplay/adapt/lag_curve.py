@@ -12,7 +12,7 @@ import numpy as np
 from navreplay.adapt.lag_memory import LAGS
 from navreplay.timeline import Floats
 
-__all__ = ["Correlation", "Curve", "drift_shape", "fit_curve", "fit_levels", "independent_values", "lag_shape"]
+__all__ = ["Correlation", "Curve", "drift_shape", "fit_curve", "fit_variances", "independent_values", "lag_shape"]
 
 
 class Correlation(NamedTuple):
@@ -46,6 +46,8 @@ _GRID = (
 )
 """White noise, and time constants [s] from that of noise which looks white to one that looks constant in all lags."""
 _SHAPES = np.array([lag_shape(correlation) for correlation in _GRID])
+_UNSEEN = np.array([correlation.time > LAGS[-1] for correlation in _GRID])
+"""Which time constants only a level can tell from others."""
 _DRIFT = drift_shape()
 _LEAST = 1e-12
 
@@ -58,18 +60,22 @@ def fit_curve(curve: Floats, weights: Floats) -> Curve:
     drift = (shape2 * right_drift - both * right) / np.maximum(shape2 * drift2 - both**2, _LEAST)
     drift = np.clip(drift, 0.0, right_drift / max(drift2, _LEAST))
     variance = np.maximum(right - both * drift, 0.0) / np.maximum(shape2, _LEAST)
-    best = int((((curve - variance[:, None] * _SHAPES - drift[:, None] * _DRIFT) ** 2) @ weights).argmin())
+    misfit = ((curve - variance[:, None] * _SHAPES - drift[:, None] * _DRIFT) ** 2) @ weights
+    if not weights[-1]:
+        misfit[_UNSEEN] = np.inf
+    best = int(misfit.argmin())
     return Curve(float(variance[best]), float(drift[best]), _GRID[best])
 
 
-def fit_levels(curves: Floats, weights: Floats, fitted: Curve) -> tuple[Floats, Floats]:
+def fit_variances(curves: Floats, weights: Floats, fitted: Curve) -> tuple[Floats, Floats]:
     """Variances (k,) with which the correlation of a fitted curve fits the curves (k, lags + 1) less its drift by least squares
-    with weights (k, lags + 1); and the share (k,) of their values in what all would tell at the greatest of each's weights."""
+    with weights (k, lags + 1); and how much (k,) of what each
+    tells is there, were all its lags and its level of its greatest weight."""
     shape = lag_shape(fitted.correlation)
-    told = weights @ shape**2
+    present = weights @ shape**2
     left = np.maximum(curves - fitted.drift * _DRIFT, 0.0)
-    share = told / np.maximum(weights.max(axis=1) * (shape @ shape), _LEAST)
-    return (weights * left) @ shape / np.maximum(told, _LEAST), share
+    share = present / np.maximum(weights.max(axis=1) * (shape @ shape), _LEAST)
+    return (weights * left) @ shape / np.maximum(present, _LEAST), share
 
 
 def independent_values(correlation: Correlation, seconds: Floats, interval: float) -> Floats:

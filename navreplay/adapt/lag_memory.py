@@ -21,8 +21,7 @@ __all__ = ["LAGS", "LagMemory", "add_levels", "extend_memory", "forget", "rows_o
 LAGS = np.array([1.0, 2.0, 4.0, 8.0, 16.0, 32.0])
 """[s]. Each counts alike, which along a geometric series is what weights of 1 / L are among all lags: short lags have more
 independent values."""
-_TOLERANCE = 0.25
-"""By which share of a lag two epochs may be nearer or further."""
+_ROUNDING = 1e-6
 _BLOCKS = 10
 
 
@@ -87,11 +86,13 @@ def add_levels(
 
 
 def _epochs_before(t_s: Floats) -> list[int]:
-    """By lag the index of the epoch that lies it before the last of t_s (n,) [s], -1 where there is none."""
-    after = np.clip(np.searchsorted(t_s, -LAGS), 1, max(len(t_s) - 1, 1))
-    nearest = np.where(t_s[after - 1] + t_s[np.minimum(after, len(t_s) - 1)] > -2 * LAGS, after - 1, after)
-    nearest = np.minimum(nearest, len(t_s) - 1)
-    return np.where(np.abs(t_s[nearest] + LAGS) <= _TOLERANCE * LAGS, nearest, -1).tolist()
+    """By lag the index of the epoch that lies it before the last of t_s (n,) [s], to half a step, -1 where there is none."""
+    if len(t_s) < 2:
+        return [-1] * len(LAGS)
+    after = np.clip(np.searchsorted(t_s, -LAGS), 1, len(t_s) - 1)
+    nearest = np.minimum(np.where(-LAGS - t_s[after - 1] < t_s[after] + LAGS, after - 1, after), len(t_s) - 2)
+    found = np.abs(t_s[nearest] + LAGS) <= -0.5 * t_s[-2] + _ROUNDING
+    return np.where(found, nearest, -1).tolist()
 
 
 def _make_room(memory: LagMemory, labels: tuple[str, ...]) -> LagMemory:
@@ -115,7 +116,7 @@ def _make_room(memory: LagMemory, labels: tuple[str, ...]) -> LagMemory:
 def _walk(memory: LagMemory, here: NDArray[np.intp], step: Floats, elapsed: float) -> tuple[Floats, Floats]:
     """Paths (k, n) and their epochs (n,) [s] with step (m,) of the rows here (m,); where it is NaN a path begins anew."""
     t_s = memory.t_s - elapsed
-    kept = t_s >= -LAGS[-1] * (1 + _TOLERANCE)
+    kept = t_s >= -LAGS[-1] - elapsed
     past, now = memory.path[:, kept], np.full((len(memory.path), 1), np.nan)
     if past.shape[1]:
         now[here, 0] = past[here, -1] + step

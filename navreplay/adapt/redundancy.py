@@ -19,6 +19,7 @@ __all__ = ["level_squares"]
 
 _DOUBT = 100.0
 """a: the state may be off by ten of the filter's sigmas."""
+_LEAST = 1e-12
 _CLOCK = 1e6
 """Variance [m^2, m^2/s^2] added for a receiver clock of which nothing is known."""
 
@@ -30,7 +31,9 @@ def level_squares(innovation: Innovation, variance: Floats) -> tuple[Floats, Flo
     spread = (_DOUBT * innovation.spread + _CLOCK * clock) / np.outer(std, std)
     unit = np.eye(len(std))
     left = solve(unit + spread, unit)
-    off, judged = left @ (innovation.residual / std), np.diagonal(clock)
+    weight, judged = clock / variance, np.diagonal(clock)
+    common = weight @ innovation.residual / np.maximum(weight.sum(axis=1), _LEAST)
+    off = left @ ((innovation.residual - common) / std)
     return judged * off**2, judged * (np.diagonal(left) / _DOUBT + (1 - 1 / _DOUBT) * (left**2).sum(axis=1))
 
 

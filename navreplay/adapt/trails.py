@@ -86,8 +86,7 @@ def difference_steps(seen: Mapping[str, int], innovation: Innovation, longest_st
     if leftover is None or innovation.t_ns - leftover.t_ns > longest_step * 1e9:
         return np.full(len(innovation.labels), np.nan)
     before = [
-        leftover.residual[label] if label in seen and seen[label] == leftover.t_ns else nan
-        for label in innovation.labels
+        leftover.residual[label] if label in seen and seen[label] == leftover.t_ns else nan for label in innovation.labels
     ]
     return innovation.residual - before
 
