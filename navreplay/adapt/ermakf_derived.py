@@ -10,14 +10,14 @@ a variance of its own. Noise that lasts T has window / T independent values in a
 inverse-gamma distributed about that of the kind, and the kind's about the told one: with n values of mean square s^2, and a
 belief in c that counts as b, R = (b c + n s^2) / (b + n). A satellite that is new has the R of its surroundings, and R leaves
 the told one by as much as there are independent values that speak against it. The kind's scale is the maximum-likelihood one
-of the t-distribution with b + 2 degrees of freedom that this makes of single values, whose weights are
-inverse to R (Lange, Little, Taylor, J. Am. Stat. Assoc. 84 (1989) 881), so that one bad satellite does not speak for all;
-one iteration of it is done per epoch.
+of the t-distribution with b + 2 degrees of freedom that this makes of single values, in which each weighs inverse to its R
+(Lange, Little, Taylor, J. Am. Stat. Assoc. 84 (1989) 881), so that one bad satellite does not speak for all; one iteration of
+it is done per epoch.
 Assumes: noise of one correlation in all components of a kind, and told variances that are right relative to each other.
 Fails: where a bias is common to satellites (heights under an atmosphere unlike its model); with four satellites or fewer,
-and on position fixes, which show no level: time constants beyond the longest lag are then not seen; and for half a window
-after noise has changed. R says how large the errors are, not that they stay: a filter that takes correlated noise for white
-still believes their mean.
+and on position fixes, which show no level: noise that lasts and a drift of the INS are then not to be told apart, the drift is
+believed, and R is too small (half of it with 20 s, a quarter with 60 s); and for half a window after noise has changed. R
+says how large the errors are, not that they stay: a filter that takes correlated noise for white still believes their mean.
 """
 
 from dataclasses import dataclass
