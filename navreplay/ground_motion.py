@@ -41,7 +41,8 @@ def find_motion(fixes: GnssFixSeries, speed: float) -> np.ndarray:
 def find_standstill(imu: ImuSeries, fixes: GnssFixSeries) -> int:
     """Time until which the vehicle stands still from the IMU's first sample on; that sample's time when it does not.
 
-    Still means: GNSS slow, and half-second means of rate and specific force near those of the beginning.
+    Still means: GNSS slow, and half-second means of rate and specific force near those of the beginning. A first speed that a
+    push below the limit could not have brought about since was there from the beginning (uniform flight).
     """
     begin = int(imu.t_ns[0])
     edges = np.flatnonzero(np.diff((imu.t_ns - begin) // _STILL_WINDOW_NS, prepend=-1))
@@ -52,8 +53,11 @@ def find_standstill(imu: ImuSeries, fixes: GnssFixSeries) -> int:
     pushed = np.linalg.norm(accel - np.median(accel[:4], axis=0), axis=1) > _STILL_FORCE
     stirred = np.flatnonzero(turning | pushed)
     until = int(imu.t_ns[edges[stirred[0]]]) if len(stirred) else int(imu.t_ns[-1])
-    fast = fixes.t_ns[find_motion(fixes, _STILL_SPEED) & (fixes.t_ns >= begin)]
-    until = min(until, int(fast[0])) if len(fast) else until
+    fast = np.flatnonzero(find_motion(fixes, _STILL_SPEED) & (fixes.t_ns >= begin))
+    if len(fast) and fixes.t_ns[fast[0]] < until:
+        until = int(fixes.t_ns[fast[0]])
+        if np.linalg.norm(fix_velocity(fixes)[fast[0], :2]) > _STILL_FORCE * (until - begin) / 1e9:
+            return begin
     return until if until - begin >= _SHORTEST_STANDSTILL_NS else begin
 
 

@@ -17,6 +17,7 @@ __all__ = [
     "LaunchOptions",
     "MotionOptions",
     "RangeOptions",
+    "VehicleOptions",
 ]
 
 _DEG = pi / 180
@@ -172,6 +173,15 @@ class MotionOptions:
 
 
 @dataclass(frozen=True, slots=True)
+class VehicleOptions:
+    """What is known of a vehicle's motion. zero_velocity: where the IMU shows that it stands still, its velocity is measured to
+    be zero, with standard deviation zero_velocity_std [m/s] per axis."""
+
+    zero_velocity: bool = False
+    zero_velocity_std: float = 0.01
+
+
+@dataclass(frozen=True, slots=True)
 class ConsiderOptions:
     """Unknown constant biases that a filter reckons with but does not estimate: standard deviations, NED where there are three,
     0 where there is none.
@@ -243,5 +253,6 @@ class FilterOptions:
     ranges: RangeOptions = RangeOptions()
     motion: MotionOptions = MotionOptions()
     attitude: AttitudeOptions = AttitudeOptions()
+    vehicle: VehicleOptions = VehicleOptions()
     launch: LaunchOptions | None = None
     consider: ConsiderOptions = ConsiderOptions()

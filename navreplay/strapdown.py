@@ -4,7 +4,7 @@ Corrections for coning and sculling follow Savage, Strapdown Inertial Navigation
 (JGCD 21 (1998) 19 and 208), with angular rate and specific force linear in time over two samples.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -13,7 +13,17 @@ from numpy.typing import NDArray
 from navreplay import _strapdown_kernel
 from navreplay.timeline import Floats, ImuSeries, LogError, Times, Trajectory
 
-__all__ = ["NavState", "Steps", "find_gaps", "idle_steps", "integrate_steps", "make_steps", "mechanise", "split_at_long_gaps"]
+__all__ = [
+    "Leg",
+    "NavState",
+    "Steps",
+    "find_gaps",
+    "idle_steps",
+    "integrate_steps",
+    "make_steps",
+    "mechanise",
+    "split_at_long_gaps",
+]
 
 GAP_FACTOR = 2.5
 """An interval beyond this many median intervals is a gap: one lost sample is interpolated without further notice."""
@@ -42,6 +52,37 @@ class Steps:
         """The steps that begin at or after t_ns, which must be an end of a step or the beginning of the first."""
         rest = slice(int(np.searchsorted(self.t_ns, t_ns, side="right")), None)
         return Steps(t_ns, self.t_ns[rest], self.dt[rest], self.dtheta[rest], self.dvel[rest], self.bridged[rest])
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Leg:
+    """What is moved over at a time: from before step `first` to the nodes behind ends (k,) steps, counted from the first of all
+    steps. interval [s]: longest step of the covariance. keep: transitions and noises between the nodes are asked for."""
+
+    steps: Steps
+    first: int
+    ends: NDArray[np.intp]
+    interval: float
+    keep: bool = False
+
+    @property
+    def part(self) -> slice:
+        """The leg's steps among all."""
+        return slice(self.first, int(self.ends[-1]))
+
+    @property
+    def counts(self) -> NDArray[np.intp]:
+        """(k,) steps from the beginning of the leg to each node."""
+        return self.ends - self.first
+
+    @property
+    def elapsed(self) -> Floats:
+        """(k,) time [s] from the beginning of the leg to each node."""
+        return np.concatenate([[0.0], np.cumsum(self.steps.dt[self.part])])[self.counts]
+
+    def keeping(self) -> "Leg":
+        """The same, with transitions and noises."""
+        return replace(self, keep=True)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -126,7 +126,15 @@ def _add_run(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
 def _add_compare(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     parser = _add_command(commands, "compare", "process a drive with several methods: one report")
     _add_logs(parser)
-    parser.add_argument("--filters", metavar="A,B,...", required=True, help="methods, see 'navreplay filters'")
+    parser.add_argument(
+        "--filters",
+        metavar="A,B,...",
+        required=True,
+        help="methods, see 'navreplay filters'; all: every one but the slow ml-ga and mlckf-ga",
+    )
+    parser.add_argument(
+        "--vary", metavar="KEY=A,B,...", help="every method with each value of one key, e.g. gnss.noise_scale=0.25,1,4"
+    )
     _add_processing(parser)
 
 

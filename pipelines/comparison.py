@@ -1,35 +1,74 @@
 """The report of one drive through several methods: one table per quantity, errors drawn over each other."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from navreplay.earth import ned_between
+from pipelines.compare import Variant
 from pipelines.plot import Plot, bend_of
-from pipelines.report import Report, build_report
+from pipelines.report import Report
 from pipelines.report_figures import outage_shades
 from pipelines.result import RunResult
 from pipelines.svg import Layer, Panel, draw_map, draw_time_panels, map_height
 from pipelines.table import Figure, Table, figure_text
 
-__all__ = ["build_comparison", "comparison_figures", "comparison_plots", "comparison_tables"]
+__all__ = [
+    "MOST_DRAWN",
+    "Comparison",
+    "build_comparison",
+    "comparison_figures",
+    "comparison_plots",
+    "comparison_tables",
+    "overview_table",
+]
 
 _SCHEMA = "navreplay comparison 1"
 _COMMON = ("versions", "channels", "files", "assumptions", "damage", "findings", "configuration")
 _OWN = ("drive", "errors", "nees", "within_3_sigma", "nis", "innovations", "satellites", "outages", "events", "timing_s")
+_HEADLINES = {"position": "3d", "velocity": "3d", "attitude": "heading"}
 _STRETCHES = {"all": "whole drive", "outside": "outside outages", "inside": "inside outages"}
 _STYLES = tuple(f"c{number}" for number in range(1, 7))
+MOST_DRAWN = len(_STYLES)
+"""Runs that the plots can tell apart, and that have a headline each."""
 
 
-def build_comparison(labels: Sequence[str], results: Sequence[RunResult]) -> Report:
-    """What the runs share once (of the first run), and by label under ``methods`` what each one reports of its own."""
-    reports = [build_report(result) for result in results]
-    methods = {label: {key: report[key] for key in _OWN} for label, report in zip(labels, reports, strict=True)}
-    return {"schema": _SCHEMA, **{key: reports[0][key] for key in _COMMON}, "methods": methods}
+@dataclass(frozen=True, eq=False, slots=True)
+class Comparison:
+    """What is left of the runs once each has written its own outputs, in their order.
+
+    reports: of every variant that ran, as `build_report` makes them. failures: of the others, why they could not. drawn: the
+    results of the first MOST_DRAWN that ran; of more, plots would be unreadable and memory full.
+    """
+
+    reports: tuple[tuple[Variant, Report], ...]
+    failures: tuple[tuple[Variant, str], ...]
+    drawn: tuple[tuple[Variant, RunResult], ...]
+
+
+def build_comparison(comparison: Comparison) -> Report:
+    """What the runs share once (of the first run), by label under ``methods`` what each one reports of its own, and under
+    ``failures`` why the others could not run."""
+    variant, first = comparison.reports[0]
+    return {
+        "schema": _SCHEMA,
+        **{key: first[key] for key in _COMMON},
+        "varied": variant.setting.key or None,
+        "methods": {
+            variant.label: {"value": variant.setting.value, **{key: report[key] for key in _OWN}}
+            for variant, report in comparison.reports
+        },
+        "failures": {variant.label: reason for variant, reason in comparison.failures},
+    }
 
 
 def comparison_figures(report: Report) -> tuple[Figure, ...]:
-    """A headline per method: its horizontal error, and where there were outages that at their ends."""
+    """A headline per method: its horizontal error, and where there were outages that at their ends. None of more methods than
+    can be drawn: the overview tells more at a glance."""
+    if len(report["methods"]) > MOST_DRAWN:
+        return ()
     figures = []
     for label, method in report["methods"].items():
         ends = method["outages"]["summary"]["end_horizontal"]
@@ -46,9 +85,10 @@ def comparison_figures(report: Report) -> tuple[Figure, ...]:
 
 
 def comparison_tables(report: Report) -> tuple[Table, ...]:
-    """One table per quantity, a row per method."""
+    """The overview, what could not run, and one table per quantity, a row per method."""
     methods = report["methods"]
-    tables = []
+    failures = Table("Could not run", ("method", "reason"), tuple(report["failures"].items()))
+    tables = [table for table in (overview_table(report), failures) if table.rows]
     first = next(iter(methods.values()))
     if first["errors"] is not None:
         for quantity in first["errors"]["all"]:
@@ -56,6 +96,36 @@ def comparison_tables(report: Report) -> tuple[Table, ...]:
     tables += [table for table in (_outage_table(report), _consistency_table(report), _use_table(report)) if table.rows]
     seconds = tuple((label, figure_text(sum(method["timing_s"].values()))) for label, method in methods.items())
     return (*tables, Table("Time spent", ("method", "seconds"), seconds, "Reading included, which is done once for all."))
+
+
+def overview_table(report: Report) -> Table:
+    """The figures that matter most, a row per method; no rows without a reference."""
+    methods = {label: method for label, method in report["methods"].items() if method["errors"] is not None}
+    if not methods:
+        return Table("Overview", ("method",), ())
+    outages = any(method["outages"]["summary"]["end_horizontal"]["count"] for method in methods.values())
+    columns = {label: _headline_columns(method, "outside" if outages else "all") for label, method in methods.items()}
+    heads = next(iter(columns.values()))
+    rows = tuple((label, *(figure_text(figures.get(head)) for head in heads)) for label, figures in columns.items())
+    stretch = "outside outages, which last until a fix is used again" if outages else "whole drive"
+    note = f"Errors are RMS, {stretch}; NEES over its expected value: 1 is right."
+    return Table("Overview", ("method", *heads), rows, note)
+
+
+def _headline_columns(method: Mapping[str, Any], stretch: str) -> dict[str, float | None]:
+    """By head of the column. stretch: for which the errors count."""
+    errors = method["errors"][stretch]
+    columns: dict[str, float | None] = {}
+    for quantity, component in _HEADLINES.items():
+        if quantity in errors:
+            table = errors[quantity]
+            columns[f"{quantity} {component.replace('3d', '3-D')} [{table['unit']}]"] = table[component]["rms"]
+    if stretch == "outside":
+        columns["outage end, horizontal median [m]"] = method["outages"]["summary"]["end_horizontal"]["p50"]
+    nees = method["nees"]["position"]
+    columns["position NEES"] = None if nees["mean"] is None else nees["mean"] / nees["dof"]
+    columns["epochs"] = errors["position"]["3d"]["count"]
+    return columns
 
 
 def _error_table(report: Report, quantity: str, stretch: str) -> Table:
@@ -110,23 +180,28 @@ def _use_table(report: Report) -> Table:
     return Table("Measurements", ("", "method", "read", "used", "rejected"), tuple(sorted(rows, key=lambda row: row[0])))
 
 
-def comparison_plots(labels: Sequence[str], results: Sequence[RunResult]) -> tuple[Plot, ...]:
-    """The tracks, and for each quantity the errors of all methods."""
-    styles = [_STYLES[i % len(_STYLES)] for i in range(len(labels))]
+def comparison_plots(comparison: Comparison) -> tuple[Plot, ...]:
+    """The tracks, and for each quantity the errors, of the runs that are drawn."""
+    labels = [variant.label for variant, _ in comparison.drawn]
+    results = [result for _, result in comparison.drawn]
+    styles = _STYLES[: len(labels)]
     legend = tuple((f"line {style}", label) for style, label in zip(styles, labels, strict=True))
     tracks = _track_layers(labels, styles, results)
-    plots = [_plot_tracks(tracks, results[0])]
+    runs = len(comparison.reports)
+    of_all = f" The first {len(labels)} of {runs} runs are drawn; the tables show all." if runs > len(labels) else ""
+    plots = [_plot_tracks(tracks, results[0], of_all)]
     judged = [result.evaluation for result in results if result.evaluation is not None]
     for quantity in judged[0].errors if judged else ():
         beside_tracks = map_height(tracks) if len(plots) == 1 else None
-        plots.append(_plot_errors(quantity, labels, styles, results, legend, beside_tracks))
+        plots.append(_plot_errors(quantity, labels, styles, results, legend, beside_tracks, of_all))
     return tuple(plots)
 
 
-def _plot_tracks(layers: Sequence[Layer], first: RunResult) -> Plot:
+def _plot_tracks(layers: Sequence[Layer], first: RunResult, of_all: str) -> Plot:
     legend = tuple((f"{layer.kind} {layer.style}", layer.name) for layer in layers)
     lat, lon = np.degrees(first.solution.lla[0, :2])
-    return Plot("Track", f"East and north of the first position, {lat:.6f}°, {lon:.6f}°.", legend, draw_map(layers))
+    note = f"East and north of the first position, {lat:.6f}°, {lon:.6f}°.{of_all}"
+    return Plot("Track", note, legend, draw_map(layers))
 
 
 def _track_layers(labels: Sequence[str], styles: Sequence[str], results: Sequence[RunResult]) -> list[Layer]:
@@ -149,6 +224,7 @@ def _plot_errors(
     results: Sequence[RunResult],
     legend: tuple[tuple[str, str], ...],
     height: float | None,
+    of_all: str,
 ) -> Plot:
     start = min(int(result.solution.t_ns[0]) for result in results)
     duration = max(int(result.solution.t_ns[-1]) - start for result in results) / 1e9
@@ -167,6 +243,6 @@ def _plot_errors(
             for label, style, t_ns, series in drawn
         ]
         panels.append(Panel(f"{axis} [{unit}]", tuple(layers), bend))
-    note = "Estimated minus reference." + ("" if bend is None else " Signed logarithmic scale.")
+    note = f"Estimated minus reference.{'' if bend is None else ' Signed logarithmic scale.'}{of_all}"
     svg = draw_time_panels(panels, duration, outage_shades(results[0]), height)
     return Plot(f"{quantity.capitalize()} error", note, legend, svg)

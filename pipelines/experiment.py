@@ -33,6 +33,7 @@ __all__ = [
     "Arm",
     "ArmOutcome",
     "AttitudeScale",
+    "ConsistencyClaim",
     "Experiment",
     "NoiseClaim",
     "OrderClaim",
@@ -134,13 +135,24 @@ class NoiseClaim:
 
 @dataclass(frozen=True, slots=True)
 class RatioClaim:
-    """A promise: the error of an arm in a quantity and a stretch is at most so many times that of the reference."""
+    """A promise: the error of an arm in a quantity and a stretch is at most so many times that of the reference. most None:
+    the distance is told without a promise."""
 
     stretch: str
     quantity: str
     arm: str
     reference: str
-    most: float
+    most: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class ConsistencyClaim:
+    """A promise: the NEES of an arm in a quantity and a stretch is accepted. reference: an arm to tell beside it."""
+
+    stretch: str
+    quantity: str
+    arm: str
+    reference: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,6 +175,7 @@ class Experiment:
     orders: tuple[OrderClaim, ...] = ()
     noise_claims: tuple[NoiseClaim, ...] = ()
     ratios: tuple[RatioClaim, ...] = ()
+    accepted: tuple[ConsistencyClaim, ...] = ()
     published_noise: tuple[PublishedNoise, ...] = ()
     start: StartErrors | None = None
     perturbations: tuple[Perturbation, ...] = ()

@@ -11,12 +11,13 @@ from navreplay.solution import WeightSeries
 from navreplay.timeline import Floats, LogError
 from pipelines.experiment import CONSISTENT, QUANTITIES, Experiment, Outcome
 from pipelines.experiment_summary import SETTLED, WHOLE, summarise_experiment
+from pipelines.mean_figures import draw_means
 from pipelines.plot import Plot
 from pipelines.report import Report, dump_json
 from pipelines.report_html import render_html
 from pipelines.report_markdown import render_markdown
 from pipelines.svg import Layer, Panel, draw_time_panels
-from pipelines.table import Figure, Table, figure_text
+from pipelines.table import Figure, Table, figure_text, interval_text
 from pipelines.weight_figures import weight_panels
 from pipelines.whole_file import write_whole
 
@@ -32,7 +33,7 @@ def write_experiment(experiment: Experiment, outcomes: Sequence[Outcome], out_di
     title = f"{experiment.name}: {experiment.description}"
     figures, tables = experiment_figures(report), experiment_tables(report)
     configuration = {key: report[key] for key in ("paper", "scenario", "seeds", "stretches", "notes")}
-    html = render_html(title, experiment.paper, figures, experiment_plots(experiment, outcomes), tables, configuration)
+    html = render_html(title, experiment.paper, figures, experiment_plots(experiment, outcomes, report), tables, configuration)
     texts = {
         "experiment.json": dump_json(report),
         "experiment.md": render_markdown(title, figures, tables),
@@ -58,10 +59,7 @@ def experiment_figures(report: Report) -> tuple[Figure, ...]:
 
 
 def _interval_text(interval: dict[str, Any], unit: str = "") -> str:
-    if interval["mean"] is None:
-        return "–"
-    half = "" if interval["half_width"] is None else f" ± {figure_text(interval['half_width'])}"
-    return f"{figure_text(interval['mean'])}{half} {unit}".strip()
+    return interval_text(interval["mean"], interval["half_width"], unit)
 
 
 def experiment_tables(report: Report) -> tuple[Table, ...]:
@@ -233,22 +231,20 @@ def _arm_table(report: Report) -> Table:
     return Table("Methods", ("", "method", "parameters", "told of the noise", "CPU ms per epoch", "seeds failed"), rows)
 
 
-def experiment_plots(experiment: Experiment, outcomes: Sequence[Outcome]) -> tuple[Plot, ...]:
-    """Errors and R of the drawn arms over time, the stretches shaded."""
+def experiment_plots(experiment: Experiment, outcomes: Sequence[Outcome], report: Report) -> tuple[Plot, ...]:
+    """Errors and R of the drawn arms over time, the stretches shaded, and the mean errors of all arms."""
     styles = {label: f"c{number}" for number, label in enumerate(experiment.drawn, start=1)}
     legend = tuple((f"line {style}", label) for label, style in styles.items())
     duration = experiment.scenario.journey.duration
     shades = tuple(window for stretch in experiment.stretches for window in stretch.windows)
     count = len(outcomes)
     errors = draw_time_panels(_error_panels(experiment, outcomes, styles), duration, shades)
-    plots = [
-        Plot("Errors", f"Log10 of the root mean square over {count} seeds of the 3-D errors; stretches shaded.", legend, errors)
-    ]
+    plots = [Plot("Errors", f"Root mean square over {count} seeds of the 3-D errors; stretches shaded.", legend, errors)]
     noise = _noise_panels(outcomes, styles, duration)
     if noise:
-        note = f"Median over {_NOISE_BIN_S:g} s and all seeds of log10 of the variance used over the true one; 0 is right."
+        note = f"Median over {_NOISE_BIN_S:g} s and all seeds of the variance used over the true one; 1 is right."
         plots.append(Plot("R used over R true", note, legend, draw_time_panels(noise, duration, shades)))
-    return (*plots, *_weight_plots(experiment, outcomes, shades))
+    return (*plots, *draw_means(report), *_weight_plots(experiment, outcomes, shades))
 
 
 def _weight_plots(experiment: Experiment, outcomes: Sequence[Outcome], shades: tuple[tuple[float, float], ...]) -> list[Plot]:
@@ -277,8 +273,8 @@ def _error_panels(experiment: Experiment, outcomes: Sequence[Outcome], styles: d
             errors = [o.arms[label].errors[:, 3 * i : 3 * i + 3] * factor for o in outcomes if label in o.arms]
             if errors:
                 mean_square = np.mean([(error**2).sum(axis=1) for error in errors], axis=0)
-                layers.append(Layer("line", outcomes[0].t_s, np.log10(mean_square) / 2, style, label))
-        panels.append(Panel(f"log10 {quantity} [{unit}]", tuple(layers)))
+                layers.append(Layer("line", outcomes[0].t_s, np.sqrt(mean_square), style, label))
+        panels.append(Panel(f"{quantity} [{unit}]", tuple(layers), 0.0))
     return panels
 
 
@@ -293,8 +289,8 @@ def _noise_panels(outcomes: Sequence[Outcome], styles: dict[str, str], duration:
             if noises:
                 t_s = np.concatenate([noise.t_s for noise in noises])
                 ratio = np.concatenate([noise.ratio for noise in noises])
-                layers.append(Layer("line", centres, np.log10(_bin_medians(t_s, ratio, len(centres))), style, label))
-        panels.append(Panel(f"log10 {kind.replace('_', ' ')}", tuple(layers)))
+                layers.append(Layer("line", centres, _bin_medians(t_s, ratio, len(centres)), style, label))
+        panels.append(Panel(kind.replace("_", " "), tuple(layers), 0.0))
     return panels
 
 

@@ -19,7 +19,7 @@ from pipelines.experiment import (
     Outcome,
     Stretch,
 )
-from pipelines.experiment_promises import judge_promises, tell_promises
+from pipelines.experiment_promises import judge_consistency, judge_promises, tell_consistency, tell_promises
 from pipelines.plain_data import plain_data
 from pipelines.report import Report
 
@@ -89,6 +89,7 @@ def summarise_experiment(experiment: Experiment, outcomes: Sequence[Outcome]) ->
         for arm in experiment.arms
     }
     promises = judge_promises(experiment.ratios, figures, _interval)
+    consistency = judge_consistency(experiment.accepted, arms)
     orders = [_judge_order(claim, figures) for claim in (*published_orders(experiment), *experiment.orders)]
     explanations = [
         {
@@ -125,7 +126,12 @@ def summarise_experiment(experiment: Experiment, outcomes: Sequence[Outcome]) ->
             "orders": orders,
             "explanations": explanations,
             "promises": promises,
-            "conclusions": _conclude(orders, explanations, len(outcomes)) + tell_promises(promises),
+            "accepted": consistency,
+            "conclusions": (
+                *_conclude(orders, explanations, len(outcomes)),
+                *tell_promises(promises),
+                *tell_consistency(consistency),
+            ),
             "notes": experiment.notes,
         }
     )

@@ -1,13 +1,21 @@
 """Everything a run leaves in its folder; each file appears complete or not at all."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from navreplay.timeline import LogError
-from pipelines.comparison import build_comparison, comparison_figures, comparison_plots, comparison_tables
+from pipelines.compare import Outcome, Variant
+from pipelines.comparison import (
+    MOST_DRAWN,
+    Comparison,
+    build_comparison,
+    comparison_figures,
+    comparison_plots,
+    comparison_tables,
+)
 from pipelines.estimated import estimated_toml
 from pipelines.launch_csv import write_launch_csv
-from pipelines.report import build_report, dump_json
+from pipelines.report import Report, build_report, dump_json
 from pipelines.report_figures import report_plots
 from pipelines.report_html import render_html
 from pipelines.report_markdown import render_markdown
@@ -17,7 +25,7 @@ from pipelines.solution_csv import utc_text, write_solution_csv
 from pipelines.spec import dump_toml, filter_options
 from pipelines.whole_file import write_whole
 
-__all__ = ["label_methods", "write_comparison", "write_outputs"]
+__all__ = ["write_comparison", "write_each", "write_outputs"]
 
 
 def write_outputs(result: RunResult, out_dir: Path) -> dict[str, Path]:
@@ -49,17 +57,36 @@ def write_outputs(result: RunResult, out_dir: Path) -> dict[str, Path]:
     return _write_files(out_dir, writers)
 
 
-def write_comparison(results: Sequence[RunResult], out_dir: Path) -> dict[str, Path]:
-    """Writes report.json, report.md and report.html of several methods on one drive, and each method's own outputs in a folder
-    named after it. Returns the paths of the common report by name. Raises LogError as `write_outputs` does."""
-    labels = label_methods(results)
-    for label, result in zip(labels, results, strict=True):
-        write_outputs(result, out_dir / label)
-    report = build_comparison(labels, results)
-    drive, subtitle = _title(results[0])
-    title = f"{drive}: {', '.join(labels)}"
+def write_each(outcomes: Iterable[Outcome], out_dir: Path) -> Comparison:
+    """Writes each run's own outputs, as it is done, in a folder of its own, and keeps what their comparison needs.
+
+    Raises LogError as `write_outputs` does, and the first failure where every variant failed.
+    """
+    reports: list[tuple[Variant, Report]] = []
+    failures: list[tuple[Variant, LogError]] = []
+    drawn: list[tuple[Variant, RunResult]] = []
+    for outcome in outcomes:
+        variant, result = outcome.variant, outcome.result
+        if isinstance(result, LogError):
+            failures.append((variant, result))
+            continue
+        write_outputs(result, out_dir / variant.folder)
+        reports.append((variant, build_report(result)))
+        if len(drawn) < MOST_DRAWN:
+            drawn.append((variant, result))
+    if not reports:
+        raise failures[0][1]
+    return Comparison(tuple(reports), tuple((variant, str(error)) for variant, error in failures), tuple(drawn))
+
+
+def write_comparison(comparison: Comparison, out_dir: Path) -> dict[str, Path]:
+    """Writes report.json, report.md and report.html of several methods on one drive. Returns the paths by name. Raises LogError
+    as `write_outputs` does."""
+    report = build_comparison(comparison)
+    drive, subtitle = _title(comparison.drawn[0][1])
+    title = f"{drive}: {_name_runs(comparison)}"
     figures, tables = comparison_figures(report), comparison_tables(report)
-    html = render_html(title, subtitle, figures, comparison_plots(labels, results), tables, report["configuration"])
+    html = render_html(title, subtitle, figures, comparison_plots(comparison), tables, report["configuration"])
     markdown = render_markdown(title, figures, tables)
     return _write_files(
         out_dir,
@@ -71,10 +98,9 @@ def write_comparison(results: Sequence[RunResult], out_dir: Path) -> dict[str, P
     )
 
 
-def label_methods(results: Sequence[RunResult]) -> tuple[str, ...]:
-    """The methods' names, numbered where one occurs twice."""
-    names = [result.solution.method for result in results]
-    return tuple(name if names.count(name) == 1 else f"{name}-{names[: i + 1].count(name)}" for i, name in enumerate(names))
+def _name_runs(comparison: Comparison) -> str:
+    labels = [variant.label for variant, _ in comparison.reports]
+    return ", ".join(labels) if len(labels) <= MOST_DRAWN else f"{len(labels)} runs"
 
 
 def _title(result: RunResult) -> tuple[str, str]:

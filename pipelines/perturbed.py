@@ -7,7 +7,7 @@ import numpy as np
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.error_models.ned import POSITION, VELOCITY, Propagated
 from navreplay.filters.moments import Linearised
-from navreplay.strapdown import NavState, Steps
+from navreplay.strapdown import Leg, NavState
 from navreplay.timeline import Floats
 
 __all__ = ["Perturbation", "Perturbed"]
@@ -36,15 +36,11 @@ class Perturbed(Linearised):
         model: ErrorModel,
         state: NavState,
         cov: Floats,
-        steps: Steps,
-        first: int,
-        ends: np.ndarray,
-        interval: float,
-        keep: bool = False,
+        leg: Leg,
     ) -> Propagated:
-        """From state and cov (n, n) before step `first` to the nodes behind ends (k,) steps, the last an epoch's."""
-        moved = model.propagate(state, cov, steps, first, ends, interval, keep)
-        t_s = (int(steps.t_ns[ends[-1] - 1]) - self.start_ns) / 1e9
+        """From state and cov (n, n) to the nodes of a leg, the last an epoch's."""
+        moved = model.propagate(state, cov, leg)
+        t_s = (int(leg.steps.t_ns[leg.ends[-1] - 1]) - self.start_ns) / 1e9
         error = np.zeros(model.size)
         for each in self.perturbations:
             if each.start <= t_s <= each.end:

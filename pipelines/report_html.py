@@ -11,7 +11,7 @@ from pipelines.table import Figure, Table
 
 __all__ = ["render_html"]
 
-_FIGURE_CELL = re.compile(r"[-−–]?[\d.,]*(e[-+]?\d+)?( ?(%|s|m|m/s|deg))?")
+_FIGURE_CELL = re.compile(r"[-−–]?[\d.,]*(e[-+]?\d+)?( ± [\d.,]+(e[-+]?\d+)?)?( ?(%|s|m|m/s|deg))?")
 _SAMPLES = {
     "line": '<path class="{}" d="M1 5H19"/>',
     "band": '<path class="{}" d="M1 1H19V9H1Z"/>',

@@ -9,6 +9,7 @@ from pipelines.rerun_layout import Stack
 from pipelines.rerun_paint import BLUE, GREEN, GREY, ORANGE, PALE, RED, send_dots, send_line, time_columns
 from pipelines.rerun_sky import send_satellite_innovations, send_shared_noise
 from pipelines.result import RunResult
+from pipelines.scales import find_breaks
 
 __all__ = ["list_stacks", "send_biases", "send_errors", "send_innovations", "send_weights"]
 
@@ -49,13 +50,17 @@ def send_errors(recording: rr.RecordingStream, result: RunResult) -> None:
             send_line(recording, f"/sigma/position/{label}/sigma", times, solution.std[:, i], "sigma", BLUE)
         return
     times = time_columns(evaluation.t_ns, solution)
+    # an unknown value where the reference has a gap, so that no line leads across it
+    breaks = find_breaks(evaluation.t_ns / 1e9)
+    broken = time_columns(np.insert(evaluation.t_ns, breaks, evaluation.t_ns[breaks - 1] + 1), solution)
     for quantity, measured in evaluation.errors.items():
         series = suit_errors(measured)
         for i, label in enumerate(series.labels):
             path, envelope = f"/errors/{quantity}/{label}", 3 * series.std[:, i]
             send_line(recording, f"{path}/upper", times, envelope, "+3 sigma", PALE)
             send_line(recording, f"{path}/lower", times, -envelope, "-3 sigma", PALE)
-            send_line(recording, f"{path}/error", times, series.error[:, i], "error", BLUE)
+            error = np.insert(series.error[:, i], breaks, np.nan)
+            send_line(recording, f"{path}/error", broken, error, "error", BLUE)
 
 
 def send_innovations(recording: rr.RecordingStream, solution: Solution) -> None:

@@ -1,12 +1,13 @@
-"""Axes of plots: round ticks, linear and signed-logarithmic scales, thinning of lines to what a screen can show."""
+"""Axes of plots: round ticks; linear, logarithmic and signed-logarithmic scales; lines thinned to what a screen can show."""
 
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from navreplay.timeline import Floats
 
-__all__ = ["Scale", "nice_ticks", "thin_band", "thin_line", "time_label", "time_ticks"]
+__all__ = ["Scale", "find_breaks", "log_ticks", "nice_ticks", "thin_band", "thin_line", "time_label", "time_ticks"]
 
 _TIME_STEPS = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14400, 28800, 86400)
 
@@ -14,7 +15,8 @@ _TIME_STEPS = (1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 14
 @dataclass(frozen=True, slots=True)
 class Scale:
     """Values from low to high on a length of pixels. linear_to: None for a linear scale; else values are shown in proportion
-    up to about this magnitude and by their logarithm beyond it (inverse hyperbolic sine)."""
+    up to about this magnitude and by their logarithm beyond it (inverse hyperbolic sine); 0 for a logarithmic scale of values
+    above zero."""
 
     low: float
     high: float
@@ -27,12 +29,16 @@ class Scale:
         return np.asarray((self._bend(values) - low) / (high - low) * self.pixels)
 
     def _bend(self, values: Floats) -> Floats:
-        return values if self.linear_to is None else np.arcsinh(values / self.linear_to)
+        if self.linear_to is None:
+            return values
+        return np.arcsinh(values / self.linear_to) if self.linear_to else np.log(values)
 
     def ticks(self, count: int) -> list[float]:
         """About count round values within the scale."""
         if self.linear_to is None:
             return nice_ticks(self.low, self.high, count)
+        if not self.linear_to:
+            return log_ticks(self.low, self.high, count)
         first, last = np.floor(np.log10(self.linear_to)) + 1, np.floor(np.log10(max(-self.low, self.high)))
         decades = 10.0 ** np.arange(last, first - 1, -max(1, np.ceil((last - first + 1) / max(count // 2, 1))))
         ticks = sorted([*-decades, 0.0, *decades])
@@ -47,6 +53,18 @@ def nice_ticks(low: float, high: float, count: int) -> list[float]:
     step = next(factor * power for factor in (1, 2, 5, 10) if factor * power >= raw * 0.999)
     first, last = int(np.ceil(low / step - 1e-9)), int(np.floor(high / step + 1e-9))
     return [float(f"{k * step:.12g}") for k in range(first, last + 1)]
+
+
+def log_ticks(low: float, high: float, count: int) -> list[float]:
+    """Powers of ten within low and high, about count of them; with their double and fivefold where those are few."""
+    first, last = int(np.floor(np.log10(low))), int(np.ceil(np.log10(high)))
+    step = max(1, round((last - first) / max(count, 1)))
+    for factors in ((1,), (1, 3), (1, 2, 5)):
+        ticks = [float(f"{f}e{power}") for power in range(first, last + 1, step) for f in factors]
+        within = [tick for tick in ticks if low <= tick <= high]
+        if len(within) >= min(count, 3):
+            return within
+    return within if len(within) > 1 else nice_ticks(low, high, count)
 
 
 def time_ticks(low: float, high: float, count: int) -> list[float]:
@@ -64,6 +82,15 @@ def time_label(seconds: float) -> str:
     minutes, second = divmod(int(seconds), 60)
     hours, minute = divmod(minutes, 60)
     return f"{hours}:{minute:02d}:{second:02d}" if hours else f"{minutes}:{second:02d}"
+
+
+def find_breaks(x: Floats) -> NDArray[np.intp]:
+    """Indices of what begins behind a gap in rising x (n,): ten usual spacings and a hundredth of the whole. No line should
+    lead across it."""
+    steps = np.diff(x)
+    if len(steps) < 2:
+        return np.empty(0, dtype=np.intp)
+    return np.flatnonzero(steps > max(10 * float(np.median(steps)), float(x[-1] - x[0]) / 100)) + 1
 
 
 def thin_line(x: Floats, y: Floats, bins: int = 700) -> tuple[Floats, Floats]:

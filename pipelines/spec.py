@@ -32,6 +32,7 @@ from pipelines.sections import (
     OutputSection,
     Section,
 )
+from pipelines.vehicle_section import VehicleSection
 
 __all__ = ["Config", "apply_sets", "config_keys", "dump_toml", "filter_options", "load_config", "validate"]
 
@@ -50,6 +51,7 @@ class Config(Section):
     consider: ConsiderSection = ConsiderSection()
     gnss: GnssSection = GnssSection()
     attitude: AttitudeSection = AttitudeSection()
+    vehicle: VehicleSection = VehicleSection()
     launch: LaunchSection = LaunchSection()
     range: RangeSection = RangeSection()
     motion: MotionSection = MotionSection()
@@ -78,6 +80,7 @@ def filter_options(config: Config) -> FilterOptions:
         default_velocity_std=config.gnss.default_velocity_std_mps,
         use=config.filter.use,
         attitude=config.attitude.options(),
+        vehicle=config.vehicle.options(),
         launch=None if config.filter.frame == "ned" else config.launch.options(config.alignment.position_deg_m),
         ranges=config.range.options(),
         motion=config.motion.options(),

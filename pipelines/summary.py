@@ -9,7 +9,9 @@ from navreplay.outages import count_outages
 from navreplay.timeline import Provenance
 from pipelines.result import RunResult
 
-__all__ = ["describe_outputs", "headline_figures", "summarise_run"]
+__all__ = ["NO_REFERENCE", "describe_log", "describe_outputs", "headline_figures", "summarise_run"]
+
+NO_REFERENCE = "no reference, so no errors; give one with --reference"
 
 
 def headline_figures(result: RunResult) -> dict[str, object]:
@@ -55,13 +57,17 @@ def summarise_run(result: RunResult) -> list[str]:
     solution = result.solution
     minutes = (int(solution.t_ns[-1]) - int(solution.t_ns[0])) / 60e9
     lines = [f"{solution.method}: {minutes:.1f} min, {len(solution)} rows, {sum(result.timing_s.values()):.1f} s to process"]
-    lines += [
-        f"{finding.level}: {finding.text} {finding.hint}".rstrip() for finding in result.findings if finding.level != "info"
-    ]
-    lines += _describe_losses(result.timeline.provenance)
+    lines += describe_log(result)
     if result.evaluation is None:
-        return [*lines, "no reference, so no errors; give one with --reference"]
+        return [*lines, NO_REFERENCE]
     return lines + _describe_errors(result.evaluation)
+
+
+def describe_log(result: RunResult) -> list[str]:
+    """What looked wrong in the log, and what of it was lost."""
+    findings = [finding for finding in result.findings if finding.level != "info"]
+    lines = [f"{finding.level}: {finding.text} {finding.hint}".rstrip() for finding in findings]
+    return lines + _describe_losses(result.timeline.provenance)
 
 
 def _describe_losses(provenance: Provenance) -> list[str]:

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from navreplay.timeline import Floats
-from pipelines.scales import Scale, nice_ticks, thin_band, thin_line, time_label, time_ticks
+from pipelines.scales import Scale, find_breaks, nice_ticks, thin_band, thin_line, time_label, time_ticks
 
 __all__ = ["SKY_HEIGHT", "Layer", "Panel", "draw_map", "draw_sky", "draw_time_panels", "map_height"]
 
@@ -37,7 +37,8 @@ class Layer:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Panel:
-    """A plot of layers. label: of the vertical axis. linear_to: see `Scale`; None for a linear axis."""
+    """A plot of layers. label: of the vertical axis. linear_to: see `Scale`; None for a linear axis, 0 for a logarithmic
+    one."""
 
     label: str
     layers: tuple[Layer, ...]
@@ -74,8 +75,11 @@ def _draw_layer(layer: Layer, across: Scale, up: Scale, x_ordered: bool = True) 
     if layer.kind == "line" and not x_ordered:
         return f'<path class="line {layer.style}" d="{_trace(across.place(layer.x), down(layer.y))}"/>'
     if layer.kind == "line":
-        x, y = thin_line(layer.x, layer.y)
-        return f'<path class="line {layer.style}"{title} d="M{_points(across.place(x), down(y))}"/>' if len(x) else ""
+        known = np.isfinite(layer.x) & np.isfinite(layer.y)
+        pieces = np.split(np.flatnonzero(known), find_breaks(layer.x[known]))
+        thinned = (thin_line(layer.x[piece], layer.y[piece]) for piece in pieces if len(piece))
+        path = "".join([f"M{_points(across.place(x), down(y))}" for x, y in thinned])
+        return f'<path class="line {layer.style}"{title} d="{path}"/>' if path else ""
     known = np.flatnonzero(np.isfinite(layer.x) & np.isfinite(layer.y))
     known = known[:: len(known) // _MOST_DOTS + 1]
     px, py = across.place(layer.x[known]).tolist(), down(layer.y[known]).tolist()
@@ -84,6 +88,17 @@ def _draw_layer(layer: Layer, across: Scale, up: Scale, x_ordered: bool = True) 
     else:
         path = "".join([f"M{a - 3:.1f} {b - 3:.1f}l6 6m0-6l-6 6" for a, b in zip(px, py, strict=True)])
     return f'<path class="{layer.kind} {layer.style}"{title} d="{path}"/>' if path else ""
+
+
+def _log_extent(layers: Iterable[Layer]) -> tuple[float, float]:
+    """What a logarithmic axis must show: every point, and never less than a factor of four."""
+    values = np.concatenate([np.zeros(0), *(layer.y for layer in layers)])
+    known = values[np.isfinite(values) & (values > 0)]
+    if not len(known):
+        return 0.1, 10.0
+    low, high = float(known.min()), float(known.max())
+    margin = max((high / low) ** 0.06, 2 * (low / high) ** 0.5, 1.0)
+    return low / margin, high * margin
 
 
 def _extent(layers: Iterable[Layer]) -> tuple[float, float]:
@@ -109,7 +124,7 @@ def _number(value: float) -> str:
 
 
 def _draw_panel(panel: Panel, across: Scale, shades: Sequence[tuple[float, float]], top: float, tall: float) -> str:
-    low, high = _extent(panel.layers)
+    low, high = _extent(panel.layers) if panel.linear_to != 0 else _log_extent(panel.layers)
     up = Scale(low, high, tall, panel.linear_to)
     parts = []
     for tick in up.ticks(min(5, max(2, round(tall / 20)))):

@@ -1,8 +1,9 @@
 """What a report consists of beside its plots: headline figures and tables of texts."""
 
 from dataclasses import dataclass
+from math import floor, log10
 
-__all__ = ["Figure", "Table", "figure_text"]
+__all__ = ["Figure", "Table", "figure_text", "interval_text", "table_lines"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +28,29 @@ class Table:
     def is_list(self) -> bool:
         """Whether it is a list of sentences."""
         return self.header == ("",)
+
+
+def interval_text(mean: float | None, half_width: float | None, unit: str = "") -> str:
+    """A mean with half the width of its interval, that to two significant digits and the mean to the same place; a dash for
+    an unknown mean."""
+    if mean is None or not half_width:
+        return figure_text(mean, unit)
+    places = 1 - floor(log10(half_width))
+    mean, half_width = round(mean, places), round(half_width, places)
+    if 0 < max(abs(mean), half_width) < 1e-3:
+        return f"{mean:.{max(places + floor(log10(abs(mean or half_width))), 0)}e} ± {half_width:.1e} {unit}".strip()
+    shown = max(places, 0)
+    return f"{mean:.{shown}f} ± {half_width:.{shown}f} {unit}".strip()
+
+
+def table_lines(table: Table) -> list[str]:
+    """Header and rows as lines of equal columns, the first to the left and the figures to the right."""
+    rows = (table.header, *table.rows)
+    widths = [max(len(row[i]) for row in rows) for i in range(len(table.header))]
+    return [
+        "  ".join([row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))])
+        for row in rows
+    ]
 
 
 def figure_text(value: float | None, unit: str = "") -> str:

@@ -7,7 +7,7 @@ import numpy as np
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.error_models.ned import NedErrorModel, Propagated
 from navreplay.filters.moments import Linearised
-from navreplay.strapdown import NavState, Steps
+from navreplay.strapdown import Leg, NavState
 from navreplay.timeline import Floats
 from synthetic_logs.windows import ScaledWindow, scale_in
 
@@ -26,15 +26,11 @@ class ToldProcess(Linearised):
         model: ErrorModel,
         state: NavState,
         cov: Floats,
-        steps: Steps,
-        first: int,
-        ends: np.ndarray,
-        interval: float,
-        keep: bool = False,
+        leg: Leg,
     ) -> Propagated:
-        """From state and cov (n, n) before step `first` to the nodes behind ends (k,) steps; noise is that at the last one."""
+        """From state and cov (n, n) to the nodes of a leg; noise is that at the last one."""
         if not isinstance(model, NedErrorModel):
             raise ValueError("the noise of the IMU can be told for its own error model alone")
-        scale = float(scale_in(self.windows, np.array([(steps.t_ns[ends[-1] - 1] - self.start_ns) / 1e9]))[0])
+        scale = float(scale_in(self.windows, np.array([(leg.steps.t_ns[leg.ends[-1] - 1] - self.start_ns) / 1e9]))[0])
         told = replace(model.noise, gyro_noise=model.noise.gyro_noise * scale, accel_noise=model.noise.accel_noise * scale)
-        return NedErrorModel(told).propagate(state, cov, steps, first, ends, interval, keep)
+        return NedErrorModel(told).propagate(state, cov, leg)

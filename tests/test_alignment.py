@@ -74,6 +74,15 @@ def test_constant_cruise_is_not_taken_for_a_standstill():
     assert find_standstill(imu, fixes) <= t[200]
 
 
+def test_uniform_flight_is_no_standstill_however_noisy_its_positions():
+    """80 m/s with positions of 10 m: the way of the first second may pass for noise, that of two cannot."""
+    for seed in range(1, 21):
+        log = synthetic_logs.simulate(synthetic_logs.with_duration(SPIRAL, 30.0), seed)
+        told = np.tile(np.diag(np.square([10.0, 10.0, 16.0])), (len(log.fixes), 1, 1))
+        fixes = replace(without_velocity(log.fixes), cov_pos=told)
+        assert find_standstill(log.imu, fixes) == log.imu.t_ns[0]
+
+
 def test_course_alignment_reaches_back_to_the_standstill(car):
     found = align(sources(car))
     assert found.t_ns < car.imu.t_ns[0] + 2_000_000_000

@@ -18,7 +18,7 @@ from navreplay.measurements import Measurement
 from navreplay.metrics import evaluate
 from navreplay.options import ConsiderOptions, FilterOptions, GateOptions
 from navreplay.solution import Solution
-from navreplay.strapdown import NavState, make_steps
+from navreplay.strapdown import Leg, NavState, make_steps
 from navreplay.timeline import LogError, Timeline
 from pipelines.spec import filter_options, validate
 
@@ -97,7 +97,7 @@ def propagate(considered: ConsiderOptions, cov: np.ndarray | None = None):
     start = np.diag(np.append(np.full(15, 1e-6), np.diagonal(model.bias_cov))) if cov is None else cov
     state = NavState.at(log.truth.lla[0], np.array([30.0, 20.0, -3.0]), log.truth.q_nb[0])
     ends = np.arange(50, 501, 50)
-    return model, start, model.propagate(state, start, steps, 0, ends, 0.05, keep=True)
+    return model, start, model.propagate(state, start, Leg(steps, 0, ends, 0.05, keep=True))
 
 
 def test_propagation_is_that_of_states_and_biases_together():
@@ -293,11 +293,20 @@ def test_smoothing_is_refused(log):
         run_filter(log.timeline(), build_method("eckf"), options(smooth=True))
 
 
-def test_a_method_that_calibrates_first_is_refused(log):
+def test_a_bank_is_refused(log):
     with pytest.raises(
-        LogError, match=r"consider parameters need a single filter .* 'em-offline' is not; set consider.every_method"
+        LogError, match=r"consider parameters need a single linearised filter, which 'mmae' is not; set consider"
     ):
-        run_filter(log.timeline(), build_method("em-offline"), options(consider=replace(ALL_BIASES, every_method=True)))
+        run_filter(log.timeline(), build_method("mmae"), options(consider=replace(ALL_BIASES, every_method=True)))
+
+
+@pytest.mark.parametrize("name", ["em-offline", "auto"])
+def test_a_method_that_calibrates_finds_the_noise_without_biases_and_reckons_with_them_after(log, name):
+    without = run_filter(log.timeline(), build_method(name), options())
+    biases = replace(NOTHING, position_bias=(2.0, 2.0, 3.0), every_method=True)
+    solution = run_filter(log.timeline(), build_method(name), options(consider=biases))
+    assert solution.estimated == without.estimated
+    assert (solution.std[-1, :3] > [1.9, 1.9, 2.9]).all()
 
 
 def test_the_configuration_names_biases_with_units():

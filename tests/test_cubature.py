@@ -17,7 +17,7 @@ from navreplay.filters.run import run_filter
 from navreplay.measurements import position_measurement
 from navreplay.metrics import evaluate
 from navreplay.options import GRADES, FilterOptions, GateOptions, ImuNoise, RangeOptions
-from navreplay.strapdown import NavState, Steps, integrate_steps
+from navreplay.strapdown import Leg, NavState, Steps, integrate_steps
 from navreplay.timeline import LogError, Timeline
 from synthetic_logs.scenarios import SCENARIOS
 
@@ -83,7 +83,7 @@ def test_a_state_without_variance_keeps_none():
     _cubature_kernel.fill_root(cov, root)
     np.testing.assert_allclose(root @ root.T, cov, atol=1e-12)
     model = PointwiseModel(TACTICAL)
-    moved = model.propagate(flying_state(), cov, turning_steps(20), 0, np.array([10, 20]), 0.05)
+    moved = model.propagate(flying_state(), cov, Leg(turning_steps(20), 0, np.array([10, 20]), 0.05))
     assert np.isfinite(moved.covariances).all()
     assert moved.covariances[-1, 12, 12] < 1e-8
 
@@ -183,7 +183,7 @@ def test_points_obey_the_published_error_equations():
 def linear_velocity_error(steps: Steps, state: NavState, error: np.ndarray) -> np.ndarray:
     """What the linear transition makes of the error in velocity."""
     ends = np.array([len(steps)])
-    moved = NedErrorModel(TACTICAL).propagate(state, np.eye(15), steps, 0, ends, 0.05, keep=True)
+    moved = NedErrorModel(TACTICAL).propagate(state, np.eye(15), Leg(steps, 0, ends, 0.05, keep=True))
     return (moved.transitions[0] @ error)[3:6]
 
 
@@ -193,8 +193,8 @@ def test_small_errors_move_linearly(attitude_states, noise):
     linear, model = NedErrorModel(noise), PointwiseModel(noise, attitude_states)
     cov, steps, ends = draw_covariance(2, model.size, 1e-3), turning_steps(100), np.array([30, 60, 100])
     cross = np.random.default_rng(2).normal(size=(model.size, 2)) * np.sqrt(np.diag(cov))[:, None]
-    one = linear.propagate(flying_state(), cov, steps, 0, ends, 0.01, True, cross)
-    two = model.propagate(flying_state(), cov, steps, 0, ends, 0.01, True, cross)
+    one = linear.propagate(flying_state(), cov, Leg(steps, 0, ends, 0.01, keep=True), cross)
+    two = model.propagate(flying_state(), cov, Leg(steps, 0, ends, 0.01, keep=True), cross)
     std = np.sqrt(np.diagonal(one.covariances, axis1=1, axis2=2))
     scale = std[:, :, None] * std[:, None, :]
     np.testing.assert_allclose(two.covariances / scale, one.covariances / scale, atol=2e-3)
@@ -215,7 +215,7 @@ def test_second_order_terms_are_found():
     cov = np.diag([1e-4] * 6 + [1e-10, 1e-10, sigma**2] + [1e-16] * 3 + [1e-12] * 3)
     for attitude_states in (3, 4):
         model = PointwiseModel(ImuNoise(1e-9, 1e-9, 1e-9, 1e-9, 0.0, 0.0), attitude_states)
-        moved = model.propagate(state, cov, steps, 0, np.array([count]), 0.05)
+        moved = model.propagate(state, cov, Leg(steps, 0, np.array([count]), 0.05))
         lost = integrate_steps(steps, state)[-1, 3] - moved.states[-1, 3]
         assert lost == pytest.approx(3.0 * sigma**2 / 2, rel=0.05)
 
@@ -225,8 +225,8 @@ def test_where_points_would_mean_nothing_the_transition_is_linear():
     cov[8] *= 100.0
     cov[:, 8] *= 100.0
     steps, ends = turning_steps(40), np.array([20, 40])
-    one = NedErrorModel(TACTICAL).propagate(flying_state(), cov, steps, 0, ends, 0.05, True)
-    two = PointwiseModel(TACTICAL).propagate(flying_state(), cov, steps, 0, ends, 0.05, True)
+    one = NedErrorModel(TACTICAL).propagate(flying_state(), cov, Leg(steps, 0, ends, 0.05, keep=True))
+    two = PointwiseModel(TACTICAL).propagate(flying_state(), cov, Leg(steps, 0, ends, 0.05, keep=True))
     np.testing.assert_array_equal(two.transitions, one.transitions)
     np.testing.assert_allclose(two.covariances, one.covariances, rtol=1e-9, atol=1e-12)
 
@@ -238,8 +238,8 @@ def test_the_clock_beside_the_points_moves_as_beside_the_linear_model():
     packed = flying_state().pack()
     state = NavState.unpack(np.concatenate([packed, [100.0, 120.0, -3.0]]))
     ends = np.array([10, 40])
-    one = Linearised().propagate(model, state, cov, turning_steps(40), 0, ends, 0.01)
-    two = Cubature().propagate(model, state, cov, turning_steps(40), 0, ends, 0.01)
+    one = Linearised().propagate(model, state, cov, Leg(turning_steps(40), 0, ends, 0.01))
+    two = Cubature().propagate(model, state, cov, Leg(turning_steps(40), 0, ends, 0.01))
     np.testing.assert_allclose(two.states[:, -3:], one.states[:, -3:], rtol=1e-12)
     np.testing.assert_allclose(two.covariances[:, -3:, -3:], one.covariances[:, -3:, -3:], rtol=1e-9)
     std = np.sqrt(np.diagonal(one.covariances, axis1=1, axis2=2))
@@ -251,8 +251,8 @@ def test_inputs_are_not_changed_and_results_repeat():
     model, cov, steps = NedErrorModel(TACTICAL), draw_covariance(6, 15), turning_steps(30)
     state, ends = flying_state(), np.array([10, 30])
     before = state.pack(), cov.copy(), steps.dvel.copy(), ends.copy()
-    one = Cubature().propagate(model, state, cov, steps, 0, ends, 0.05)
-    two = Cubature().propagate(model, state, cov, steps, 0, ends, 0.05)
+    one = Cubature().propagate(model, state, cov, Leg(steps, 0, ends, 0.05))
+    two = Cubature().propagate(model, state, cov, Leg(steps, 0, ends, 0.05))
     for now, then in zip((state.pack(), cov, steps.dvel, ends), before, strict=True):
         np.testing.assert_array_equal(now, then)
     np.testing.assert_array_equal(one.covariances, two.covariances)
@@ -327,8 +327,8 @@ def test_the_measurement_is_first_order():
 
 def test_compiled_kernel_equals_its_source():
     model, cov, steps, ends = PointwiseModel(TACTICAL), draw_covariance(8, 15), turning_steps(6), np.array([3, 6])
-    fast = model.propagate(flying_state(), cov, steps, 0, ends, 0.02)
-    slow = NedErrorModel(TACTICAL).propagate(flying_state(), cov, steps, 0, ends, 0.02, True)
+    fast = model.propagate(flying_state(), cov, Leg(steps, 0, ends, 0.02))
+    slow = NedErrorModel(TACTICAL).propagate(flying_state(), cov, Leg(steps, 0, ends, 0.02, keep=True))
     empty, tau = np.empty((15, 0)), model.correlation_time()
     filled = slow.states, slow.covariances, slow.crosses, slow.transitions, slow.noises
     _cubature_kernel.propagate.py_func(

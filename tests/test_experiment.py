@@ -12,7 +12,19 @@ from navreplay.adapt.iae import Iae
 from navreplay.filters.core import Gaussian, Innovation
 from navreplay.timeline import LogError
 from pipelines.cli import main
-from pipelines.experiment import Arm, ArmOutcome, NoiseClaim, Outcome, Published, Stretch, run_experiment, run_seed
+from pipelines.experiment import (
+    Arm,
+    ArmOutcome,
+    ConsistencyClaim,
+    NoiseClaim,
+    Outcome,
+    Published,
+    RatioClaim,
+    Stretch,
+    run_experiment,
+    run_seed,
+)
+from pipelines.experiment_promises import judge_consistency, judge_promises, tell_consistency, tell_promises
 from pipelines.experiment_report import write_experiment
 from pipelines.experiment_summary import published_orders, rmse_figures, summarise_experiment
 from pipelines.experiments import EXPERIMENTS
@@ -215,7 +227,7 @@ def test_files(tmp_path):
     assert set(paths) == {"experiment.json", "experiment.md", "experiment.html"}
     report = json.loads(paths["experiment.json"].read_text())
     assert report["schema"] == "navreplay experiment 1"
-    assert "| fixed | 3 ± 12.7 |" in paths["experiment.md"].read_text()
+    assert "| fixed | 3 ± 13 |" in paths["experiment.md"].read_text()
     html = paths["experiment.html"].read_text()
     assert html.count('<svg class="plot time"') == 2
     assert "published, end" in html
@@ -238,6 +250,10 @@ def test_every_experiment_names_what_it_has():
         for row in experiment.published_noise:
             assert row.arm in labels
             assert row.stretch in stretches
+        for promise in (*experiment.ratios, *experiment.accepted):
+            assert {promise.arm, promise.reference} <= labels
+            assert promise.stretch in stretches
+            assert promise.quantity in names
 
 
 def test_the_moment_oracle_is_told_second_moments_and_means():
@@ -332,3 +348,33 @@ def test_command_lists_and_refuses(capsys, tmp_path):
     assert "the nearest is 'ermakf-city'" in capsys.readouterr().err
     assert main(["experiment", "ermakf-city"]) == 1
     assert "name the folder for the results with -o" in capsys.readouterr().err
+
+
+def test_promises_are_kept_broken_undecided_or_only_told():
+    figures = {
+        "auto": {"end": {"position": np.array([1.0, 1.1, 0.9])}},
+        "oracle": {"end": {"position": np.array([1.0, 1.0, 1.0])}},
+    }
+
+    def interval(values):
+        return {"mean": float(values.mean()), "half_width": 0.2, "seeds": 3}
+
+    limits = (2.0, 0.5, 1.1, None)
+    claims = [RatioClaim("end", "position", "auto", "oracle", most) for most in limits]
+    judged = judge_promises(claims, figures, interval)
+    assert [one["verdict"] for one in judged] == ["kept", "broken", "undecided", None]
+    told = tell_promises(judged)
+    assert told[0].startswith("The position error of auto is 1.000 ± 0.200 times that of oracle in 'end'; that it is at most 2")
+    assert told[3].endswith("of oracle in 'end'.")
+
+
+def test_consistency_is_accepted_from_nine_tenths_on():
+    def arm(share):
+        return {"stretches": {"end": {"nees": {"position": {"mean": 3.0, "share_inside": share}}}}}
+
+    arms = {"auto": arm(0.9), "fixed": arm(0.89), "oracle": arm(0.95)}
+    claims = [ConsistencyClaim("end", "position", label, "oracle") for label in ("auto", "fixed")]
+    claims.append(ConsistencyClaim("end", "gyro bias", "auto", "oracle"))
+    judged = judge_consistency(claims, arms)
+    assert [one["verdict"] for one in judged] == ["kept", "broken"]
+    assert "89 % of the epochs are inside their bounds (oracle: 95 %)" in tell_consistency(judged)[1]

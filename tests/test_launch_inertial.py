@@ -16,7 +16,7 @@ from navreplay.launch_frame import LaunchFrame
 from navreplay.metrics import evaluate
 from navreplay.options import AlignmentOptions, FilterOptions, GateOptions, ImuNoise, LaunchOptions
 from navreplay.rotation import euler_from_quat, quat_conjugate, quat_from_rotvec, quat_multiply, rotvec_from_quat
-from navreplay.strapdown import NavState, make_steps
+from navreplay.strapdown import Leg, NavState, make_steps
 from navreplay.timeline import LogError
 from pipelines.launch_csv import LAUNCH_COLUMNS, write_launch_csv
 from pipelines.spec import Config, filter_options
@@ -55,7 +55,7 @@ def test_the_centre_of_the_earth_lies_off_the_plumb_line():
 
 
 def moved_by(model, start, steps, ends):
-    return model.propagate(start, np.eye(15), steps, 0, ends, 0.05, keep=True)
+    return model.propagate(start, np.eye(15), Leg(steps, 0, ends, 0.05, keep=True))
 
 
 def test_a_noise_free_flight_is_the_same_as_in_ned():
@@ -101,7 +101,7 @@ def test_covariance_and_transition_agree_with_those_in_ned():
     steps = make_steps(imu, np.empty(0, dtype=np.int64))
     cross = np.eye(15)[:, :2]
     found = [
-        model.propagate(start, cov, steps, 0, np.array([6000]), 0.05, True, cross)
+        model.propagate(start, cov, Leg(steps, 0, np.array([6000]), 0.05, keep=True), cross)
         for model in (launch_model(), NedErrorModel(NOISE))
     ]
     launch, ned = found

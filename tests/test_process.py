@@ -9,7 +9,7 @@ from navreplay.earth import ned_between
 from navreplay.rotation import matrix_from_quat
 from navreplay.time_scales import week_tow_from_gps
 from navreplay.timeline import LogError
-from pipelines.compare import compare
+from pipelines.compare import Setting, compare, plan_variants
 from pipelines.outputs import write_outputs
 from pipelines.process import Drive, filter_drive, process
 from pipelines.progress import show_progress
@@ -84,13 +84,14 @@ def test_a_wrong_method_is_told_before_the_log_is_read(tmp_path):
     with pytest.raises(LogError, match="hubber"):
         process([tmp_path / "missing.mcap"], config)
     with pytest.raises(LogError, match="hubber"):
-        compare([tmp_path / "missing.mcap"], load_config(None), ["fixed", "hubber"])
+        plan_variants(["fixed", "hubber"], [Setting(load_config(None))])
 
 
 def test_parameters_go_only_to_the_method_they_are_for(tmp_path):
     path, *_ = write(LOG, tmp_path / "car.mcap")
     config = load_config(None, ["filter.name=iae", "filter.parameters={window = 5}"])
-    iae, fixed = compare([path], config, ["iae", "fixed"])
+    variants = plan_variants(["iae", "fixed"], [Setting(config)])
+    iae, fixed = (outcome.result for outcome in compare([path], variants))
     assert (iae.solution.method, fixed.solution.method) == ("iae", "fixed")
     assert dict(iae.config.filter.parameters) == {"window": 5}
     assert dict(fixed.config.filter.parameters) == {}

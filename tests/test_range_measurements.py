@@ -16,7 +16,7 @@ from navreplay.measurements import Measurement, angular_rate
 from navreplay.options import GRADES, GateOptions, MotionOptions, RangeOptions
 from navreplay.range_epochs import arrange_ranges
 from navreplay.range_measurements import RangeNoise, carried_antenna, free_antenna, range_measurement
-from navreplay.strapdown import NavState, idle_steps
+from navreplay.strapdown import Leg, NavState, idle_steps
 from tests.range_samples import DRIFT, OFFSETS, PLACE, SKY, START_NS, make_ranges
 
 LEVER = np.array([1.5, -0.7, -1.1])
@@ -98,8 +98,8 @@ def test_free_motion_steps_compose_and_carry_the_clock(model):
     full[0, -2] = full[-2, 0] = 0.3
     full[-2, -2], full[-1, -1] = 4.0, 0.25
     steps = idle_steps(START_NS, START_NS + np.array([400_000_000, 1_000_000_000]))
-    fine = both.propagate(state, full, steps, 0, np.array([1, 2]), 1.0, keep=True)
-    coarse = both.propagate(state, full, steps, 0, np.array([2]), 1.0, keep=True)
+    fine = both.propagate(state, full, Leg(steps, 0, np.array([1, 2]), 1.0, keep=True))
+    coarse = both.propagate(state, full, Leg(steps, 0, np.array([2]), 1.0, keep=True))
     rest = np.r_[0:6, 9 : both.size]
     np.testing.assert_allclose(fine.covariances[1][np.ix_(rest, rest)], coarse.covariances[0][np.ix_(rest, rest)], atol=1e-12)
     total = fine.transitions[1] @ fine.transitions[0]
@@ -123,7 +123,7 @@ def test_clocked_model_equals_one_propagation_with_all_transitions():
     )
     cov = root.T @ root
     state = replace(state_at_place(), clock=np.array([1.0, 2.0, 3.0]))
-    moved = model.propagate(state, cov, steps, 0, np.array([50, 120, 200]), 0.05, keep=True)
+    moved = model.propagate(state, cov, Leg(steps, 0, np.array([50, 120, 200]), 0.05, keep=True))
     p = cov
     for node in range(3):
         p = moved.transitions[node] @ p @ moved.transitions[node].T + moved.noises[node]

@@ -1,4 +1,4 @@
-"""The report of a run: keys, figures, escaping, plots; and of several runs."""
+"""The report of a run: keys, figures, escaping, plots."""
 
 import json
 import re
@@ -10,13 +10,12 @@ import numpy as np
 import pytest
 
 from navreplay.timeline import LogError
-from pipelines.comparison import build_comparison
-from pipelines.outputs import label_methods, write_comparison, write_outputs
+from pipelines.outputs import write_outputs
 from pipelines.report import build_report, dump_json
 from pipelines.report_tables import headline_figures, report_tables
 from pipelines.result import RunResult
 from pipelines.sections import OutputSection
-from pipelines.table import figure_text
+from pipelines.table import figure_text, interval_text
 from tests.sample_drive import make_result, make_solution
 
 NASTY = "/gps/<script>alert('x')</script>|&"
@@ -183,20 +182,18 @@ def test_figures_have_three_digits(value: float | None, text: str) -> None:
     assert figure_text(value, "m") == (text if value is not None else "–")
 
 
-def test_comparison_has_a_row_per_method_in_every_table(tmp_path: Path) -> None:
-    first, second = (without_recording(make_result(make_solution(duration_s=90, seed=seed, scale=seed))) for seed in (1, 2))
-    second = replace(second, solution=replace(second.solution, method="iae"))
-    assert label_methods([first, second, first]) == ("fixed-1", "iae", "fixed-2")
-    outputs = write_comparison([first, second], tmp_path)
-    assert list(outputs) == ["report.json", "report.md", "report.html"]
-    report = json.loads(outputs["report.json"].read_text())
-    assert list(report["methods"]) == ["fixed", "iae"]
-    assert report == json.loads(dump_json(build_comparison(["fixed", "iae"], [first, second])))
-    markdown = outputs["report.md"].read_text()
-    for title in ("Position error outside outages", "Outages", "Consistency", "Time spent"):
-        section = markdown.split(f"## {title}")[1].split("##")[0]
-        assert "fixed" in section
-        assert "iae" in section
-    assert (tmp_path / "iae" / "solution.csv").exists()
-    page = Page(outputs["report.html"].read_text())
-    assert [attributes.get("data-name") for _, attributes in page.tags].count("iae") == 9
+@pytest.mark.parametrize(
+    ("mean", "half_width", "text"),
+    [
+        (0.406, 0.00598, "0.4060 ± 0.0060"),
+        (259.4, 46.38, "259 ± 46"),
+        (1.0, None, "1"),
+        (None, None, "–"),
+        (2.0, 0.0, "2"),
+        (0.3, 12.7, "0 ± 13"),
+        (3.41e-5, 2.2e-6, "3.41e-05 ± 2.2e-06"),
+        (1455.0, 3039.0, "1500 ± 3000"),
+    ],
+)
+def test_means_are_told_as_far_as_their_interval_reaches(mean, half_width, text):
+    assert interval_text(mean, half_width) == text

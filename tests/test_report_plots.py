@@ -1,12 +1,15 @@
 """Scales, ticks and thinning of the plots."""
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pipelines.mean_figures import draw_means
 from pipelines.plot import bend_of
-from pipelines.scales import Scale, nice_ticks, thin_band, thin_line, time_label, time_ticks
+from pipelines.scales import Scale, find_breaks, log_ticks, nice_ticks, thin_band, thin_line, time_label, time_ticks
 from pipelines.svg import Layer, Panel, draw_map, draw_time_panels
 
 
@@ -77,3 +80,52 @@ def test_names_are_escaped_in_drawings() -> None:
     svg = draw_time_panels([Panel("<b>", (layer,))], 1.0)
     assert "<script" not in svg
     assert "<b>" not in svg
+
+
+@given(st.floats(-6, 6), st.floats(0.2, 8))
+def test_log_ticks_are_inside_and_rise(first: float, decades: float) -> None:
+    low, high = 10**first, 10 ** (first + decades)
+    ticks = log_ticks(low, high, 5)
+    assert 1 <= len(ticks) <= 12
+    assert ticks == sorted(ticks)
+    assert low * (1 - 1e-9) <= ticks[0]
+    assert ticks[-1] <= high * (1 + 1e-9)
+
+
+def test_logarithmic_scale_spaces_ratios_evenly() -> None:
+    scale = Scale(0.1, 1000.0, 400.0, 0.0)
+    np.testing.assert_allclose(scale.place(np.array([0.1, 1.0, 10.0, 100.0, 1000.0])), [0, 100, 200, 300, 400], atol=1e-9)
+
+
+def test_a_logarithmic_panel_shows_no_noise_as_structure() -> None:
+    """A ratio that is one but for rounding is a line in the middle."""
+    line = Layer("line", np.arange(3.0), np.array([1.0, 1.0 + 1e-15, 1.0]), "c1", "ratio")
+    drawing = draw_time_panels([Panel("ratio", (line,), 0.0)], 2.0)
+    assert 'data-low="0.5" data-high="2"' in drawing
+
+
+def test_mean_figures_draw_every_arm_and_what_was_published() -> None:
+    rmse = {quantity: {"mean": 2.0, "half_width": 0.1, "seeds": 3} for quantity in ("position", "velocity", "attitude")}
+    far = {quantity: {**figure, "mean": 200.0} for quantity, figure in rmse.items()}
+    report = {
+        "stretches": {"end": [[0, 1]]},
+        "seeds": [1, 2, 3],
+        "units": {"position": "m", "velocity": "m/s", "attitude": "deg"},
+        "published": [{"stretch": "end", "quantity": "position", "figures": {"KF": 3.0}}],
+        "arms": {"KF": {"stretches": {"end": {"rmse": rmse}}}, "<b>": {"stretches": {"end": {"rmse": far}}}},
+    }
+    (plot,) = draw_means(report)
+    assert plot.svg.count(">KF<") == 3
+    assert "&lt;b&gt;" in plot.svg
+    assert plot.svg.count("crosses bad") == 1
+    assert "published" in [name for _, name in plot.legend]
+
+
+def test_no_line_leads_across_a_gap() -> None:
+    x = np.concatenate([np.arange(0.0, 50.0, 0.2), np.arange(90.0, 140.0, 0.2)])
+    np.testing.assert_array_equal(find_breaks(x), [250])
+    assert len(find_breaks(np.arange(5.0))) == 0
+    drawing = draw_time_panels([Panel("error", (Layer("line", x, np.sin(x), "c1", "error"),))], 140.0)
+    path = re.search(r'class="line c1"[^>]* d="([^"]*)"', drawing)
+    assert path is not None
+    assert path[1].count("M") == 2

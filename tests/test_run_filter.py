@@ -12,7 +12,7 @@ from navreplay.filters.presets import PRESETS, build_method
 from navreplay.filters.run import run_filter
 from navreplay.options import AlignmentOptions, FilterOptions, GapOptions, GateOptions
 from navreplay.solution import RowStatus, Solution
-from navreplay.strapdown import NavState, make_steps
+from navreplay.strapdown import Leg, NavState, make_steps
 from navreplay.timeline import GnssFixSeries, ImuSeries, LogError, Timeline, Trajectory
 from tests.test_adapter_consistency import BANDS
 
@@ -72,7 +72,7 @@ def test_forward_solution_equals_batch_least_squares():
     start = NavState(fixes.lla[0], solution.vel_n[0], solution.q_nb[0], solution.gyro_bias[0], *np.zeros((3, 3)))
     model = NedErrorModel(SCENARIO.imu.noise)
     ends = np.searchsorted(steps.t_ns, fixes.t_ns[1:]) + 1
-    moved = model.propagate(start, solution.cov[0], steps, 0, ends, 0.05, keep=True)
+    moved = model.propagate(start, solution.cov[0], Leg(steps, 0, ends, 0.05, keep=True))
     # joint covariance of the states at all epochs, from the transitions and noises alone
     state_cov = {(0, 0): solution.cov[0]}
     for k, (phi, q) in enumerate(zip(moved.transitions, moved.noises, strict=True), 1):

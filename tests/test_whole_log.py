@@ -241,6 +241,16 @@ def draw_chain(seed: int, ratio: np.ndarray, spread: float = 0.3) -> Chain:
     return Chain(residual, np.full((len(ratio), 3), spread))
 
 
+def test_auto_believes_no_range_to_be_better_than_told():
+    """Of what stays with a satellite the scatter shows nothing; of what scatters more than told it does."""
+    scenario = synthetic_logs.with_duration(synthetic_logs.SCENARIOS["ranges-open"], 90.0)
+    drive = synthetic_logs.simulate(scenario, 2)
+    for scale, expected in ((3.0, 1.0), (0.25, 4.0)):
+        told = replace(FilterOptions(imu_noise=scenario.imu.noise), noise_scale=scale)
+        solution = run_filter(drive.timeline(), build_method("auto"), told)
+        assert solution.estimated["pseudorange_noise_scale"] == pytest.approx(expected, rel=0.15)
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_told_noise_is_kept_where_it_is_right(seed):
     chain = draw_chain(seed, np.ones(400))

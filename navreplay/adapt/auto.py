@@ -9,6 +9,8 @@ Told noise is kept until the log speaks against it, by the Bayesian information 
 The run that counts has a prescribed R for every epoch, outliers included, and so neither adaptation nor a gate.
 Assumes: what is in the log repeats itself or lasts: levels that come back, errors correlated throughout; fixes whose north,
 east and down errors change together; the error model is right but for its noise.
+Ranges: their errors stay satellite by satellite, which is not looked for, and what scatters less than told may stay the more;
+so a level below the told is not believed. consider.every_method reckons with what stays.
 Fails: on a noise that drifts without levels (three steps stand for it); on correlated errors of single satellites, or of part
 of the log only, or that stay for more than a tenth of it; on a log of a few dozen epochs, which is filtered as told.
 When well specified: mean NEES per state 0.9 to 1.1, NIS per component 0.95 to 1.05.
@@ -47,6 +49,8 @@ _STEPS, _TOLERANCE = 100, 0.01
 Kind = Literal["position", "velocity"]
 _JOINT: tuple[Kind, ...] = ("position", "velocity")
 """Kinds whose components have their level in common."""
+_LEAST = {"range": 1.0, "range_rate": 1.0}
+"""Least ratios believed: what scatters less than told may stay the more (satellites, atmosphere, reflections at rest)."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -74,6 +78,7 @@ class Auto:
         """The options with what was found, and R by epoch."""
         logs = trace(options, Prescribed(), ())
         kinds, _ = maximise_likelihood(logs, _all_kinds(logs), _STEPS, _TOLERANCE)
+        kinds = {kind: max(ratio, _LEAST.get(kind, 0.0)) for kind, ratio in kinds.items()}
         found = Found({}, (), tuple(one.by_kind(kinds) for one in logs))
         for _ in range(self.passes):
             means = _mean_ratios(logs, found.ratios)
@@ -95,7 +100,7 @@ def _mean_ratios(logs: Sequence[LinearLog], ratios: Sequence[Floats]) -> Factors
         for kind in SCALED_KINDS:
             if kind in one.rows_by_kind:
                 rows.setdefault(kind, []).append(part[one.rows_by_kind[kind]])
-    return {kind: float(np.concatenate(parts).mean()) for kind, parts in rows.items()}
+    return {kind: max(float(np.concatenate(parts).mean()), _LEAST.get(kind, 0.0)) for kind, parts in rows.items()}
 
 
 def _apply(options: FilterOptions, found: Found, means: Factors, correlated: bool) -> FilterOptions:
@@ -207,7 +212,7 @@ def _find_levels(logs: Sequence[LinearLog], found: Found) -> Found:
             same = [group for group in groups if group.kind == kind]
             levels = find_levels([group.chain for group in same])
             for group in same:
-                new[group.log][group.rows] = ratios_of(group.chain, levels)[:, None]
+                new[group.log][group.rows] = np.maximum(ratios_of(group.chain, levels), _LEAST.get(kind, 0.0))[:, None]
         found = replace(found, ratios=tuple(new))
     return found
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from navreplay.error_models.error_model import MotionModel
 from navreplay.error_models.ned import Propagated
-from navreplay.strapdown import NavState, Steps
+from navreplay.strapdown import Leg, NavState
 from navreplay.timeline import Floats
 
 __all__ = ["ClockedModel", "ReceiverModel"]
@@ -75,14 +75,12 @@ class ClockedModel:
         """(n + c,) the error by which `retract` takes computed to true."""
         return np.concatenate([self.motion.difference(true, computed), true.clock - computed.clock])
 
-    def propagate(
-        self, state: NavState, cov: Floats, steps: Steps, first: int, ends: np.ndarray, interval: float, keep: bool = False
-    ) -> Propagated:
-        """From state and cov (n + c, n + c) before step `first` to the nodes behind ends (k,) steps, counted from the first."""
-        n, k = self.motion.size, len(ends)
-        moved = self.motion.propagate(state, cov[:n, :n], steps, first, ends, interval, keep, cov[:n, n:])
+    def propagate(self, state: NavState, cov: Floats, leg: Leg) -> Propagated:
+        """From state and cov (n + c, n + c) to the nodes of a leg."""
+        n, k = self.motion.size, len(leg.ends)
+        moved = self.motion.propagate(state, cov[:n, :n], leg, cov[:n, n:])
         # the clock's transitions act on the other side of the cross-covariance, and so may come last and all at once
-        elapsed = np.cumsum(steps.dt[first : int(ends[-1])])[ends - first - 1]
+        elapsed = leg.elapsed
         phi = self.clock.transitions(elapsed)
         moved.states[:, -self.clock.size :] = phi @ state.clock
         covariances = np.empty((k, self.size, self.size))
@@ -91,7 +89,7 @@ class ClockedModel:
         covariances[:, n:, :n] = np.swapaxes(covariances[:, :n, n:], 1, 2)
         covariances[:, n:, n:] = phi @ cov[n:, n:] @ np.swapaxes(phi, 1, 2) + self.clock.noises(elapsed)
         transitions, noises = moved.transitions, moved.noises
-        if keep:
+        if leg.keep:
             between = np.diff(elapsed, prepend=0.0)
             transitions = _side_by_side(transitions, self.clock.transitions(between))
             noises = _side_by_side(noises, self.clock.noises(between))

@@ -14,7 +14,7 @@ from navreplay.error_models.error_model import ErrorModel
 from navreplay.error_models.ned import POSITION, VELOCITY, Propagated
 from navreplay.measurements import Measurement
 from navreplay.options import ConsiderOptions
-from navreplay.strapdown import NavState, Steps
+from navreplay.strapdown import Leg, NavState
 from navreplay.timeline import Floats
 
 __all__ = ["ConsideredModel"]
@@ -95,22 +95,20 @@ class ConsideredModel:
         full[ranges, 12] = 1 / np.maximum(measurement.jacobian[ranges, 2], _LEAST_SINE)
         return np.asarray(full[:, self.kept])
 
-    def propagate(
-        self, state: NavState, cov: Floats, steps: Steps, first: int, ends: np.ndarray, interval: float, keep: bool = False
-    ) -> Propagated:
-        """From state and cov (n + p, n + p) before step `first` to the nodes behind ends (k,) steps, counted from the first.
+    def propagate(self, state: NavState, cov: Floats, leg: Leg) -> Propagated:
+        """From state and cov (n + p, n + p) to the nodes of a leg.
 
         Lou et al., eqs. (26), (27), from the start to each node: what moves by itself moves as in the inner model, whose
         covariance then gains Phi C Psi' + Psi C' Phi' + Psi P_pp Psi'. Psi is integrated between nodes by the trapezoidal rule.
         """
-        n = self.inner.size
-        moved = self.inner.propagate(state, cov[:n, :n], steps, first, ends, interval, True)
-        elapsed = np.diff(np.cumsum(steps.dt[first : int(ends[-1])])[ends - first - 1], prepend=0.0)
-        transitions = np.tile(np.eye(self.size), (len(ends), 1, 1))
+        n, k = self.inner.size, len(leg.ends)
+        moved = self.inner.propagate(state, cov[:n, :n], leg.keeping())
+        elapsed = np.diff(leg.elapsed, prepend=0.0)
+        transitions = np.tile(np.eye(self.size), (k, 1, 1))
         transitions[:, :n, :n] = moved.transitions
         transitions[:, :n, n:] = elapsed[:, None, None] / 2 * (moved.transitions + np.eye(n)) @ self._rates()
         biases = cov[n:, n:]
-        covariances = np.tile(cov, (len(ends), 1, 1))
+        covariances = np.tile(cov, (k, 1, 1))
         carried, driven = cov[:n, n:], np.zeros((n, len(biases)))
         for node, transition in enumerate(transitions):
             phi, psi = transition[:n, :n], transition[:n, n:]
@@ -119,7 +117,7 @@ class ConsideredModel:
             covariances[node, :n, :n] = moved.covariances[node] + shared + shared.T + driven @ biases @ driven.T
             covariances[node, :n, n:] = carried + driven @ biases
             covariances[node, n:, :n] = covariances[node, :n, n:].T
-        kept = len(ends) if keep else 0
+        kept = k if leg.keep else 0
         noises = np.zeros((kept, self.size, self.size))
         noises[:, :n, :n] = moved.noises[:kept]
         return Propagated(moved.states, covariances, covariances[:, :, :0], transitions[:kept], noises)

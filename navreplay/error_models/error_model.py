@@ -2,10 +2,8 @@
 
 from typing import Protocol
 
-import numpy as np
-
 from navreplay.error_models.ned import Propagated
-from navreplay.strapdown import NavState, Steps
+from navreplay.strapdown import Leg, NavState
 from navreplay.timeline import Floats
 
 __all__ = ["ErrorModel", "MotionModel"]
@@ -37,10 +35,8 @@ class ErrorModel(Protocol):
         """(n,) the error by which `retract` takes computed to true."""
         ...
 
-    def propagate(
-        self, state: NavState, cov: Floats, steps: Steps, first: int, ends: np.ndarray, interval: float, keep: bool = False
-    ) -> Propagated:
-        """From state and cov (n, n) before step `first` to the nodes behind ends (k,) steps, counted from the first of all."""
+    def propagate(self, state: NavState, cov: Floats, leg: Leg) -> Propagated:
+        """From state and cov (n, n) to the nodes of a leg."""
         ...
 
 
@@ -51,11 +47,7 @@ class MotionModel(ErrorModel, Protocol):
         self,
         state: NavState,
         cov: Floats,
-        steps: Steps,
-        first: int,
-        ends: np.ndarray,
-        interval: float,
-        keep: bool = False,
+        leg: Leg,
         cross: Floats | None = None,
     ) -> Propagated:
         """The same with cross (n, c), the covariance with other states, as if those did not move."""

@@ -12,7 +12,7 @@ import numpy as np
 from navreplay import earth, rotation
 from navreplay.error_models.ned import ATTITUDE, POSITION, VELOCITY, Propagated
 from navreplay.options import MotionOptions
-from navreplay.strapdown import NavState, Steps
+from navreplay.strapdown import Leg, NavState
 from navreplay.timeline import Floats
 
 __all__ = ["FreeMotionModel"]
@@ -80,22 +80,17 @@ class FreeMotionModel:
         self,
         state: NavState,
         cov: Floats,
-        steps: Steps,
-        first: int,
-        ends: np.ndarray,
-        interval: float,
-        keep: bool = False,
+        leg: Leg,
         cross: Floats | None = None,
     ) -> Propagated:
-        """From state and cov (n, n) before step `first` to the nodes behind ends (k,) steps, counted from the first of all.
+        """From state and cov (n, n) to the nodes of a leg.
 
         Only the times of the steps are used, and the transition is exact over any interval. cross (n, c): covariance with
         other states, as if they did not move.
         """
         cross = np.empty((self.size, 0)) if cross is None else cross
-        out = Propagated.allocate(len(ends), len(state.pack()), cross, keep)
-        elapsed = np.concatenate([[0.0], np.cumsum(steps.dt[first : int(ends[-1])])])[ends - first]
-        for i, dt in enumerate(np.diff(elapsed, prepend=0.0).tolist()):
+        out = Propagated.allocate(len(leg.ends), len(state.pack()), cross, leg.keep)
+        for i, dt in enumerate(np.diff(leg.elapsed, prepend=0.0).tolist()):
             phi, q = self._transition(dt), self._noise(dt)
             way = state.vel_n * dt + state.acceleration * dt**2 / 2
             moved = replace(state, lla=earth.move_lla(state.lla, way), vel_n=state.vel_n + state.acceleration * dt)
@@ -103,7 +98,7 @@ class FreeMotionModel:
             cov, cross = phi @ cov @ phi.T + q, phi @ cross
             self._doubt_attitude(state, cov)
             out.states[i], out.covariances[i], out.crosses[i] = state.pack(), cov, cross
-            if keep:
+            if leg.keep:
                 out.transitions[i], out.noises[i] = phi, q
         return out
 

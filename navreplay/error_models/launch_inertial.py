@@ -15,7 +15,7 @@ from navreplay.error_models.ned import ATTITUDE, POSITION, VELOCITY, NedErrorMod
 from navreplay.launch_frame import LaunchFrame, LaunchState
 from navreplay.options import FilterOptions
 from navreplay.rotation import skew
-from navreplay.strapdown import NavState, Steps
+from navreplay.strapdown import Leg, NavState
 from navreplay.timeline import Floats, LogError
 
 __all__ = ["LaunchInertialModel", "exchange_errors", "inertial_model"]
@@ -32,18 +32,14 @@ class LaunchInertialModel(NedErrorModel):
         self,
         state: NavState,
         cov: Floats,
-        steps: Steps,
-        first: int,
-        ends: np.ndarray,
-        interval: float,
-        keep: bool = False,
+        leg: Leg,
         cross: Floats | None = None,
     ) -> Propagated:
         """See `NedErrorModel.propagate`."""
-        part = slice(first, int(ends[-1]))
-        times = np.append(steps.start_ns if first == 0 else steps.t_ns[first - 1], steps.t_ns[ends - 1])
+        steps, part = leg.steps, leg.part
+        times = np.append(steps.start_ns if leg.first == 0 else steps.t_ns[leg.first - 1], steps.t_ns[leg.ends - 1])
         elapsed = (times - self.launch_ns) / 1e9
-        k = len(ends)
+        k = len(leg.ends)
         states, transitions, noises = np.empty((k, 16)), np.empty((k, 15, 15)), np.empty((k, 15, 15))
         _launch_kernel.propagate_launch(
             self._pack(elapsed[0], state),
@@ -51,10 +47,10 @@ class LaunchInertialModel(NedErrorModel):
             steps.dtheta[part],
             steps.dvel[part],
             steps.bridged[part],
-            ends - first,
+            leg.counts,
             self.density(),
             self.correlation_time(),
-            interval,
+            leg.interval,
             np.ascontiguousarray(self.frame.c_il),
             self.frame.origin_i @ self.frame.c_il,
             states,
@@ -72,7 +68,7 @@ class LaunchInertialModel(NedErrorModel):
             cov, cross = phi @ cov @ phi.T + noise, phi @ cross
             cov = (cov + cov.T) / 2
             covariances[node], crosses[node] = cov, cross
-        kept = slice(None) if keep else slice(0)
+        kept = slice(None) if leg.keep else slice(0)
         return Propagated(moved, covariances, crosses, transitions[kept], noises[kept])
 
     def _pack(self, elapsed: float, state: NavState) -> Floats:

@@ -11,7 +11,7 @@ import numpy as np
 
 from navreplay import _ned_kernel, earth, rotation
 from navreplay.options import ImuNoise
-from navreplay.strapdown import NavState, Steps
+from navreplay.strapdown import Leg, NavState
 from navreplay.timeline import Floats
 
 __all__ = ["ACCEL_BIAS", "ATTITUDE", "GYRO_BIAS", "POSITION", "VELOCITY", "NedErrorModel", "Propagated", "gyro_columns"]
@@ -161,22 +161,16 @@ class NedErrorModel:
         self,
         state: NavState,
         cov: Floats,
-        steps: Steps,
-        first: int,
-        ends: np.ndarray,
-        interval: float,
-        keep: bool = False,
+        leg: Leg,
         cross: Floats | None = None,
     ) -> Propagated:
-        """From state and cov (n, n) before step `first` to the nodes behind ends (k,) steps, counted from the first of all.
-
-        interval [s]: longest step of the covariance. keep: return transitions and noises as well. cross (n, c): covariance
-        with other states, as if they did not move.
+        """From state and cov (n, n) to the nodes of a leg; cross (n, c): covariance with other states, as if these did not
+        move.
         """
         cross = np.empty((self.size, 0)) if cross is None else cross
         packed = state.pack()
-        out = Propagated.allocate(len(ends), len(packed), cross, keep)
-        part = slice(first, int(ends[-1]))
+        out = Propagated.allocate(len(leg.ends), len(packed), cross, leg.keep)
+        steps, part = leg.steps, leg.part
         _ned_kernel.propagate(
             packed,
             cov,
@@ -185,9 +179,9 @@ class NedErrorModel:
             steps.dtheta[part],
             steps.dvel[part],
             steps.bridged[part],
-            ends - first,
+            leg.counts,
             *_driving_noise(self),
-            interval,
+            leg.interval,
             out.states,
             out.covariances,
             out.crosses,

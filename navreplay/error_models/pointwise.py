@@ -19,7 +19,7 @@ import numpy as np
 
 from navreplay import _cubature_kernel
 from navreplay.error_models.ned import NedErrorModel, Propagated
-from navreplay.strapdown import NavState, Steps
+from navreplay.strapdown import Leg, NavState
 from navreplay.timeline import Floats
 
 __all__ = ["PointwiseModel"]
@@ -36,21 +36,17 @@ class PointwiseModel(NedErrorModel):
         self,
         state: NavState,
         cov: Floats,
-        steps: Steps,
-        first: int,
-        ends: np.ndarray,
-        interval: float,
-        keep: bool = False,
+        leg: Leg,
         cross: Floats | None = None,
     ) -> Propagated:
-        """From state and cov (n, n) before step `first` to the nodes behind ends (k,) steps, counted from the first of all.
+        """From state and cov (n, n) to the nodes of a leg.
 
-        interval [s]: longest step of the points, and of the linear model, whose accumulated noise is taken. keep has no effect:
-        transitions and noises are always returned. cross (n, c): covariance with other states, as if they did not move.
+        The leg's interval is the longest step of the points, and of the linear model, whose accumulated noise is taken.
+        Transitions and noises are always returned. cross (n, c): covariance with other states, as if they did not move.
         """
         cross = np.empty((self.size, 0)) if cross is None else cross
-        moved = NedErrorModel.propagate(self, state, cov, steps, first, ends, interval, True, cross)
-        part = slice(first, int(ends[-1]))
+        moved = NedErrorModel.propagate(self, state, cov, leg.keeping(), cross)
+        steps, part = leg.steps, leg.part
         _cubature_kernel.propagate(
             state.pack(),
             cov,
@@ -58,9 +54,9 @@ class PointwiseModel(NedErrorModel):
             steps.dt[part],
             steps.dtheta[part],
             steps.dvel[part],
-            ends - first,
+            leg.counts,
             self.correlation_time(),
-            interval,
+            leg.interval,
             self.attitude_states - 3,
             *(moved.states, moved.covariances, moved.crosses, moved.transitions, moved.noises),
         )

@@ -25,7 +25,7 @@ from navreplay.filters.update import Aiding, EpochGate, Updated, tell_inflation
 from navreplay.filters.weights import Mmae
 from navreplay.measurements import Measurement
 from navreplay.solution import RowStatus
-from navreplay.strapdown import NavState, Steps
+from navreplay.strapdown import Leg, NavState
 from navreplay.timeline import Floats, LogError
 
 __all__ = ["Bank", "Stack", "Update", "mix", "move_stack", "update_stack"]
@@ -106,13 +106,11 @@ class Bank:
         self._leader = ""
         self._zero = np.zeros(model.size)
 
-    def propagate(
-        self, state: NavState, cov: Floats, steps: Steps, first: int, ends: np.ndarray, interval: float, keep: bool = False
-    ) -> Propagated:
-        """From state and the mixture's cov (n, n) before step `first` to the nodes behind ends (k,) steps, where covariances
+    def propagate(self, state: NavState, cov: Floats, leg: Leg) -> Propagated:
+        """From state and the mixture's cov (n, n) to the nodes of a leg, where covariances
         are the mixture's."""
         self._share(cov)
-        moved = self._model.propagate(state, cov, steps, first, ends, interval, keep=True)
+        moved = self._model.propagate(state, cov, leg.keeping())
         self._stack = move_stack(self._stack, moved, self._q_scales, self._weights.values)
         return moved
 

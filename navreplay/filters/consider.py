@@ -27,7 +27,7 @@ from navreplay.filters.record import Recorder
 from navreplay.filters.update import Aiding, EpochGate, Estimator, Observed, Updater
 from navreplay.measurements import Measurement
 from navreplay.options import FilterOptions
-from navreplay.strapdown import NavState, Steps
+from navreplay.strapdown import Leg, NavState
 from navreplay.timeline import Floats, LogError, Times
 
 __all__ = ["ConsideredAiding", "PartialTracker", "Schmidt", "Setup", "set_up"]
@@ -47,14 +47,10 @@ class Schmidt(Linearised):
         model: ErrorModel,
         state: NavState,
         cov: Floats,
-        steps: Steps,
-        first: int,
-        ends: np.ndarray,
-        interval: float,
-        keep: bool = False,
+        leg: Leg,
     ) -> Propagated:
-        """From state and cov (n + p, n + p) before step `first` to the nodes behind ends (k,) steps, by the rule within."""
-        return self.rule.propagate(model, state, cov, steps, first, ends, interval, keep)
+        """From state and cov (n + p, n + p) to the nodes of a leg, by the rule within."""
+        return self.rule.propagate(model, state, cov, leg)
 
     def condition(self, prior: Gaussian, innovation: Innovation, noise: Floats) -> Gaussian:
         """Posterior with R = noise (m, m); where the prior was inflated, biases get their told variance back and keep their
@@ -115,11 +111,9 @@ class PartialTracker(Updater):
         self._tracked = tracking.init()
         self._process = np.zeros((model.inner.size, model.inner.size))
 
-    def propagate(
-        self, state: NavState, cov: Floats, steps: Steps, first: int, ends: np.ndarray, interval: float, keep: bool = False
-    ) -> Propagated:
-        """From state and cov (n + p, n + p) before step `first` to the nodes behind ends (k,) steps, by the moment rule."""
-        moved = super().propagate(state, cov, steps, first, ends, interval, True)
+    def propagate(self, state: NavState, cov: Floats, leg: Leg) -> Propagated:
+        """From state and cov (n + p, n + p) to the nodes of a leg, by the moment rule."""
+        moved = super().propagate(state, cov, leg.keeping())
         n = len(self._process)
         for transition, noise in zip(moved.transitions[:, :n, :n], moved.noises[:, :n, :n], strict=True):
             self._process = transition @ self._process @ transition.T + noise
@@ -164,10 +158,10 @@ def set_up(aiding: Aiding, model: ErrorModel, method: Method, options: FilterOpt
             f"filter: '{method.name}' considers biases that it does not estimate, and such a solution cannot be smoothed; set "
             "filter.smooth = false, or take a method without consider parameters"
         )
-    if not isinstance(method.rule, Linearised) or method.calibration is not None or method.weighting is not None:
+    if not isinstance(method.rule, Linearised) or method.weighting is not None:
         raise LogError(
-            "filter: consider parameters need a single filter that goes over the log once, which "
-            f"'{method.name}' is not; set consider.every_method = false, or take 'eckf'"
+            f"filter: consider parameters need a single linearised filter, which '{method.name}' is not; set "
+            "consider.every_method = false, or take 'eckf'"
         )
     considered = ConsideredModel.of(model, options.consider)
     rule = Schmidt(method.rule, model.size, np.diagonal(considered.bias_cov))

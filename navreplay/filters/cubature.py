@@ -13,8 +13,6 @@ When well specified: mean NEES per state 0.9 to 1.1, NIS per component 0.95 to 1
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from navreplay.error_models.clocked import ClockedModel
 from navreplay.error_models.considered import ConsideredModel
 from navreplay.error_models.error_model import ErrorModel, MotionModel
@@ -22,7 +20,7 @@ from navreplay.error_models.launch_inertial import LaunchInertialModel
 from navreplay.error_models.ned import NedErrorModel, Propagated
 from navreplay.error_models.pointwise import PointwiseModel
 from navreplay.filters.moments import Linearised
-from navreplay.strapdown import NavState, Steps
+from navreplay.strapdown import Leg, NavState
 from navreplay.timeline import Floats, LogError
 
 __all__ = ["Cubature"]
@@ -45,15 +43,11 @@ class Cubature(Linearised):
         model: ErrorModel,
         state: NavState,
         cov: Floats,
-        steps: Steps,
-        first: int,
-        ends: np.ndarray,
-        interval: float,
-        keep: bool = False,
+        leg: Leg,
     ) -> Propagated:
-        """From state and cov (n, n) before step `first` to the nodes behind ends (k,) steps; the state is moved to the mean of
+        """From state and cov (n, n) to the nodes of a leg; the state is moved to the mean of
         the points at each."""
-        return self._by_points(model).propagate(state, cov, steps, first, ends, interval, keep)
+        return self._by_points(model).propagate(state, cov, leg)
 
     def _by_points(self, model: ErrorModel) -> ErrorModel:
         if isinstance(model, ConsideredModel):

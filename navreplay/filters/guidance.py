@@ -1,4 +1,4 @@
-"""What aids a filter: fixes or ranges, attitudes beside them, or attitudes alone."""
+"""What aids a filter: fixes or ranges, attitudes and standstill beside them, or attitudes alone."""
 
 from dataclasses import dataclass
 
@@ -6,15 +6,18 @@ from navreplay.alignment import align
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.error_models.launch_inertial import inertial_model
 from navreplay.error_models.ned import NedErrorModel
-from navreplay.filters.attitude_aiding import AttitudeAiding, JointAiding, JointGate
+from navreplay.filters.attitude_aiding import AttitudeAiding
 from navreplay.filters.fix_aiding import FixAiding
 from navreplay.filters.gate import Gate
+from navreplay.filters.joint_aiding import JointAiding, JointGate
 from navreplay.filters.range_aiding import RangeAiding
 from navreplay.filters.range_gate import RangeGate
 from navreplay.filters.record import Recorder
+from navreplay.filters.standstill_aiding import StandstillAiding, standstill_candidates
 from navreplay.filters.update import Aiding, EpochGate
 from navreplay.heading import Sources
-from navreplay.options import FilterOptions, GateOptions
+from navreplay.options import FilterOptions, GateOptions, VehicleOptions
+from navreplay.standstill import find_standstills
 from navreplay.strapdown import NavState
 from navreplay.timeline import Floats, ImuSeries, LogError, Timeline
 from navreplay.told_start import start_as_told
@@ -24,10 +27,11 @@ __all__ = ["Guidance", "choose_guidance"]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Guidance:
-    """main: what a filter starts from and what decides its error model. aiding: main, joined by attitudes where there are any
-    beside it. inertial: error model of the IMU."""
+    """main: what a filter starts from and what decides its error model. others: what aids beside it. aiding: all of them.
+    inertial: error model of the IMU."""
 
     main: FixAiding | RangeAiding | AttitudeAiding
+    others: tuple[AttitudeAiding | StandstillAiding, ...]
     aiding: Aiding
     inertial: NedErrorModel
 
@@ -39,7 +43,7 @@ class Guidance:
     def gate(self, options: GateOptions) -> EpochGate:
         """A gate for all epochs, with nothing counted yet."""
         main: EpochGate = RangeGate(options) if isinstance(self.main, RangeAiding) else Gate(options)
-        return main if self.aiding is self.main else JointGate(main, Gate(options))
+        return JointGate(main, [(other.kinds, other.gate(options)) for other in self.others]) if self.others else main
 
     def start(
         self, timeline: Timeline, imu: ImuSeries, options: FilterOptions, recorder: Recorder
@@ -72,10 +76,23 @@ def choose_guidance(timeline: Timeline, options: FilterOptions, recorder: Record
         if attitude is None or options.use not in ("auto", "attitudes"):
             raise _nothing_to_use(options)
         alone = AttitudeAiding(attitude, model, options.attitude)
-        return Guidance(alone, alone, model)
-    if attitude is None:
-        return Guidance(main, main, model)
-    return Guidance(main, JointAiding(main, AttitudeAiding(attitude, main.model, options.attitude)), model)
+        return Guidance(alone, (), alone, model)
+    others: list[AttitudeAiding | StandstillAiding] = []
+    if attitude is not None:
+        others.append(AttitudeAiding(attitude, main.model, options.attitude))
+    if options.vehicle.zero_velocity:
+        others.append(_stand_still(timeline.imu, main, options.vehicle, recorder))
+    aiding: Aiding = JointAiding((main, *others)) if others else main
+    return Guidance(main, tuple(others), aiding, model)
+
+
+def _stand_still(
+    imu: ImuSeries, main: FixAiding | RangeAiding, options: VehicleOptions, recorder: Recorder
+) -> StandstillAiding:
+    candidates = standstill_candidates(main.t_ns, int(imu.t_ns[0]), int(imu.t_ns[-1]))
+    found = find_standstills(imu, main.fixes, candidates)
+    recorder.tell(int(imu.t_ns[0]), "info" if len(found.t_ns) else "warning", found.text)
+    return StandstillAiding(found.t_ns, options.zero_velocity_std, main.model)
 
 
 def _nothing_to_use(options: FilterOptions) -> LogError:

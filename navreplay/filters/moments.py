@@ -3,13 +3,11 @@
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.error_models.ned import Propagated
 from navreplay.filters.core import Gaussian, Innovation, condition
 from navreplay.measurements import Measurement
-from navreplay.strapdown import NavState, Steps
+from navreplay.strapdown import Leg, NavState
 from navreplay.timeline import Floats
 
 __all__ = ["Linearised", "MomentRule"]
@@ -23,13 +21,9 @@ class MomentRule(Protocol):
         model: ErrorModel,
         state: NavState,
         cov: Floats,
-        steps: Steps,
-        first: int,
-        ends: np.ndarray,
-        interval: float,
-        keep: bool = False,
+        leg: Leg,
     ) -> Propagated:
-        """From state and cov (n, n) before step `first` to the nodes behind ends (k,) steps (see `ErrorModel.propagate`)."""
+        """From state and cov (n, n) to the nodes of a leg (see `ErrorModel.propagate`)."""
         ...
 
     def innovate(self, prior: Gaussian, measurement: Measurement) -> Innovation:
@@ -50,14 +44,10 @@ class Linearised:
         model: ErrorModel,
         state: NavState,
         cov: Floats,
-        steps: Steps,
-        first: int,
-        ends: np.ndarray,
-        interval: float,
-        keep: bool = False,
+        leg: Leg,
     ) -> Propagated:
-        """From state and cov (n, n) before step `first` to the nodes behind ends (k,) steps, by the model's transition."""
-        return model.propagate(state, cov, steps, first, ends, interval, keep)
+        """From state and cov (n, n) to the nodes of a leg, by the model's transition."""
+        return model.propagate(state, cov, leg)
 
     def innovate(self, prior: Gaussian, measurement: Measurement) -> Innovation:
         """Innovation of a measurement whose residual was formed at the nominal state, against the prior error of mean (n,)."""

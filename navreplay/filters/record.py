@@ -11,7 +11,15 @@ from navreplay.timeline import Floats
 
 __all__ = ["Judged", "JudgedRows", "Recorder"]
 
-_UNITS = {"position": "m", "velocity": "m/s", "range": "m", "range_rate": "m/s", "attitude": "rad", "heading": "rad"}
+_UNITS = {
+    "position": "m",
+    "velocity": "m/s",
+    "range": "m",
+    "range_rate": "m/s",
+    "attitude": "rad",
+    "heading": "rad",
+    "standstill": "m/s",
+}
 
 
 @dataclass(frozen=True, eq=False, slots=True)

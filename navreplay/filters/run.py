@@ -22,7 +22,7 @@ from navreplay.filters.trace import Traces
 from navreplay.filters.update import Estimator
 from navreplay.options import FilterOptions
 from navreplay.solution import Event, Solution
-from navreplay.strapdown import NavState, Steps, idle_steps, make_steps
+from navreplay.strapdown import Leg, NavState, Steps, idle_steps, make_steps
 from navreplay.timeline import Floats, ImuSeries, LogError, Timeline, Times
 
 __all__ = ["run_filter"]
@@ -52,7 +52,8 @@ def run_filter(timeline: Timeline, method: Method, options: FilterOptions, progr
 
         settled = method.calibration.settle(options, trace)
         progress = next(shares)
-    solution = _run_passes(timeline, replace(method, adapter=settled.adapter), settled.options, None, progress)
+    method = replace(method, adapter=settled.adapter, calibration=None)
+    solution = _run_passes(timeline, method, settled.options, None, progress)
     told = tuple(Event(int(solution.t_ns[0]), "info", note) for note in settled.notes)
     return replace(solution, estimated=settled.estimated, events=told + solution.events)
 
@@ -206,8 +207,8 @@ def _run_epochs(
     stops = (np.searchsorted(nodes, t_ns[epochs]) + 1).tolist()
     for epoch, stop in zip([*epochs.tolist(), None], [*stops, len(nodes)], strict=True):
         if stop > node:
-            interval, keep = options.covariance_interval, options.smooth
-            moved = estimator.propagate(state, cov, steps, step, ends[node:stop], interval, keep)
+            leg = Leg(steps, step, ends[node:stop], options.covariance_interval, options.smooth)
+            moved = estimator.propagate(state, cov, leg)
             rows.put(slice(node + 1, stop + 1), moved)
             state, cov = NavState.unpack(moved.states[-1]), moved.covariances[-1]
             node, step = stop, int(ends[stop - 1])

@@ -10,7 +10,7 @@ from navreplay.error_models.noise_sources import without_sources
 from navreplay.filters.linear_log import LinearLog
 from navreplay.filters.update import Estimator, Updated
 from navreplay.measurements import Measurement
-from navreplay.strapdown import NavState, Steps
+from navreplay.strapdown import Leg, NavState
 from navreplay.timeline import Floats, Times
 
 __all__ = ["Tracer", "Traces"]
@@ -32,17 +32,15 @@ class Tracer:
     epochs: list[int] = field(default_factory=list)
     measurements: list[Measurement | None] = field(default_factory=list)
 
-    def propagate(
-        self, state: NavState, cov: Floats, steps: Steps, first: int, ends: np.ndarray, interval: float, keep: bool = False
-    ) -> Propagated:
+    def propagate(self, state: NavState, cov: Floats, leg: Leg) -> Propagated:
         """As the estimator does; the last epoch's transition and noise, the share of each source apart."""
         if self.start is None:
-            self.start_ns, self.start = steps.start_ns, cov
-        moved = self.inner.propagate(state, cov, steps, first, ends, interval, True)
+            self.start_ns, self.start = leg.steps.start_ns, cov
+        moved = self.inner.propagate(state, cov, leg.keeping())
         total = moved.noises[-1]
         sources = {}
         for name, model in self.muted.items():
-            sources[name] = total - model.propagate(state, cov, steps, first, ends, interval, True).noises[-1]
+            sources[name] = total - model.propagate(state, cov, leg.keeping()).noises[-1]
         self.moved.append((moved.transitions[-1], total - sum(sources.values()), sources))
         return moved
 

@@ -11,7 +11,7 @@ from navreplay.filters.presets import Method
 from navreplay.filters.record import Recorder
 from navreplay.measurements import Measurement
 from navreplay.solution import RowStatus
-from navreplay.strapdown import NavState, Steps
+from navreplay.strapdown import Leg, NavState
 from navreplay.timeline import Floats, Times
 
 __all__ = ["Aiding", "EpochGate", "Estimator", "Observed", "Updated", "Updater", "Verdict", "tell_inflation"]
@@ -89,10 +89,8 @@ class Aiding(Protocol):
 class Estimator(Protocol):
     """What the epoch loop drives: state and covariance (n, n) go through it, and what else it carries it keeps."""
 
-    def propagate(
-        self, state: NavState, cov: Floats, steps: Steps, first: int, ends: np.ndarray, interval: float, keep: bool = False
-    ) -> Propagated:
-        """From state and cov before step `first` to the nodes behind ends (k,) steps (see `ErrorModel.propagate`)."""
+    def propagate(self, state: NavState, cov: Floats, leg: Leg) -> Propagated:
+        """From state and cov to the nodes of a leg (see `ErrorModel.propagate`)."""
         ...
 
     def update(self, epoch: int, state: NavState, cov: Floats, dtheta: Floats, dt: float) -> Updated:
@@ -119,11 +117,9 @@ class Updater:
         self._leftover: Leftover | None = None
         self._zero = np.zeros(model.size)
 
-    def propagate(
-        self, state: NavState, cov: Floats, steps: Steps, first: int, ends: np.ndarray, interval: float, keep: bool = False
-    ) -> Propagated:
-        """From state and cov (n, n) before step `first` to the nodes behind ends (k,) steps, by the moment rule."""
-        return self._method.rule.propagate(self._model, state, cov, steps, first, ends, interval, keep)
+    def propagate(self, state: NavState, cov: Floats, leg: Leg) -> Propagated:
+        """From state and cov (n, n) to the nodes of a leg, by the moment rule."""
+        return self._method.rule.propagate(self._model, state, cov, leg)
 
     def update(self, epoch: int, state: NavState, cov: Floats, dtheta: Floats, dt: float) -> Updated:
         """The epoch of that index, from state and cov (n, n); dtheta (3,) [rad] and dt [s] are those of the step before it."""

@@ -35,6 +35,7 @@
     const { low, high, bend } = entry.panel.dataset;
     const share = 1 - y / entry.height;
     if (bend === undefined) return +low + share * (high - low);
+    if (+bend === 0) return low * (high / low) ** share;
     const first = Math.asinh(low / bend), last = Math.asinh(high / bend);
     return bend * Math.sinh(first + share * (last - first));
   }

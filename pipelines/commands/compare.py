@@ -3,31 +3,28 @@
 import argparse
 import json
 
-from navreplay.timeline import LogError
-from pipelines.commands.options import read_config
-from pipelines.compare import compare
+from pipelines.commands.options import read_settings
+from pipelines.compare import compare, name_methods, plan_variants
+from pipelines.comparison_summary import comparison_values, summarise_comparison
 from pipelines.destination import check_folder
-from pipelines.outputs import write_comparison
+from pipelines.outputs import write_comparison, write_each
 from pipelines.progress import show_progress
-from pipelines.summary import describe_outputs, headline_figures, summarise_run
+from pipelines.summary import describe_outputs
 
 __all__ = ["run"]
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Processes the logs with each method and writes OUT. Raises LogError for anything the user has to change."""
-    names = [name.strip() for name in arguments.filters.split(",") if name.strip()]
-    if not names:
-        raise LogError("compare: --filters names no method; 'navreplay filters' lists them")
-    config = read_config(arguments)
+    variants = plan_variants(name_methods(arguments.filters), read_settings(arguments))
     check_folder(arguments.out, arguments.force)
     with show_progress(arguments.quiet or arguments.json) as progress:
-        results = compare(arguments.logs, config, names, progress)
+        comparison = write_each(compare(arguments.logs, variants, progress), arguments.out)
         if progress is not None:
             progress("writing", 0.0)
-        outputs = write_comparison(results, arguments.out)
+        outputs = write_comparison(comparison, arguments.out)
     if arguments.json:
-        figures = {"methods": [headline_figures(result) for result in results]}
+        figures = comparison_values(comparison)
         print(json.dumps(figures | {"outputs": {name: str(path) for name, path in outputs.items()}}, indent=2))
     elif not arguments.quiet:
-        print("\n".join([line for result in results for line in summarise_run(result)] + describe_outputs(outputs)))
+        print("\n".join(summarise_comparison(comparison) + describe_outputs(outputs)))
