@@ -17,9 +17,9 @@ import numpy as np
 from navreplay.filters.core import Innovation
 from navreplay.timeline import Floats
 
-__all__ = ["Trail", "Trails", "extend_trails", "remove_common", "stack_trails"]
+__all__ = ["CLOCKED", "Trail", "Trails", "difference_steps", "extend_trails", "remove_common", "stack_trails"]
 
-_CLOCKED = ("range ", "range_rate ")
+CLOCKED = ("range ", "range_rate ")
 _LEAST_SHARED = 4
 
 
@@ -45,7 +45,7 @@ def remove_common(labels: tuple[str, ...], values: Floats, variances: Floats) ->
     is left is stretched to the variance that it had with its own share in the mean.
     """
     result = values.copy()
-    for kind in _CLOCKED:
+    for kind in CLOCKED:
         rows = [i for i, label in enumerate(labels) if label.startswith(kind) and values[i] == values[i]]
         if len(rows) >= _LEAST_SHARED:
             result[rows] = _centre(values[rows], variances[rows])
@@ -66,7 +66,8 @@ def extend_trails(trails: Trails, innovation: Innovation, length: int, longest_s
     """The trails (at most length differences) of the labels of this epoch; one whose last epoch is not the filter's last, or
     lies further back than longest_step [s], begins anew."""
     told = np.diagonal(innovation.noise)
-    step = remove_common(innovation.labels, _difference(trails, innovation, longest_step), told)
+    seen = {label: trail.t_ns for label, trail in trails.items()}
+    step = remove_common(innovation.labels, difference_steps(seen, innovation, longest_step), told)
     extended = {}
     for label, value, variance in zip(innovation.labels, step.tolist(), told.tolist(), strict=True):
         if isfinite(value):
@@ -78,14 +79,14 @@ def extend_trails(trails: Trails, innovation: Innovation, length: int, longest_s
     return extended
 
 
-def _difference(trails: Trails, innovation: Innovation, longest_step: float) -> Floats:
-    """(m,) residual of now less that behind the last update; NaN where there is none to compare with."""
+def difference_steps(seen: Mapping[str, int], innovation: Innovation, longest_step: float) -> Floats:
+    """(m,) residual of now less that behind the last update; NaN where there is none to compare with. seen: when each label
+    was last seen [ns]; no step is longer than longest_step [s]."""
     leftover = innovation.leftover
     if leftover is None or innovation.t_ns - leftover.t_ns > longest_step * 1e9:
         return np.full(len(innovation.labels), np.nan)
     before = [
-        leftover.residual[label] if label in trails and trails[label].t_ns == leftover.t_ns else nan
-        for label in innovation.labels
+        leftover.residual[label] if label in seen and seen[label] == leftover.t_ns else nan for label in innovation.labels
     ]
     return innovation.residual - before
 

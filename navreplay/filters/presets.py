@@ -141,7 +141,7 @@ PRESETS: dict[str, Preset | BankPreset] = {
         Preset("eiakf", "R from innovations, correlated ones taken for AR(1) (Ghaleb et al. 2017)", Eiakf),
         Preset("srmakf", "R from differences of consecutive epochs against the INS (Ge et al. 2020)", Srmakf),
         Preset("ermakf", "srmakf with random weights, and Burg's method where noise is doubtful (Ge et al. 2020)", Ermakf),
-        Preset("ermakf-derived", "R from differences over several epochs, fitted for variance and correlation", ErmakfDerived),
+        Preset("ermakf-derived", "R from differences over lags and from redundancy, fitted for correlation", ErmakfDerived),
         Preset("ermakf-whitened", "ermakf-derived with R enlarged for noise that stays", ErmakfWhitened),
         BankPreset("mmae", "bank of filters with scaled Q or R, weighted by likelihood (Magill 1965)", Mmae),
         BankPreset("mmae-floor", "the same with a floor under the weights (Maybeck 1982)", MmaeFloor),
