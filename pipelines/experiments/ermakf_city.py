@@ -1,7 +1,7 @@
 """The field test of Ge et al. (2020), section 4, as a synthetic drive of the same sensors and stretches."""
 
-from navreplay.options import AlignmentOptions, FilterOptions, GateOptions
 from pipelines.experiment import Arm, Experiment, NoiseClaim, OrderClaim, Published, Stretch
+from pipelines.experiments.ungated_ranges import NOTES, ungated_options
 from synthetic_logs.scenarios import SCENARIOS
 
 __all__ = ["ERMAKF_CITY"]
@@ -25,12 +25,7 @@ ERMAKF_CITY = Experiment(
     description="Redundant-measurement estimation of R among foliage and buildings (tightly coupled)",
     paper="Ge et al., Enhanced Redundant Measurement-Based Kalman Filter, Sensors 20 (2020) 6041, section 4",
     scenario=_SCENARIO,
-    options=FilterOptions(
-        imu_noise=_SCENARIO.imu.noise,
-        alignment=AlignmentOptions("reference"),
-        gate=GateOptions(probability=1.0),
-        output_rate=2.0,
-    ),
+    options=ungated_options(_SCENARIO),
     arms=(
         Arm("EKF", "fixed"),
         Arm("EIAKF", "eiakf"),
@@ -80,7 +75,6 @@ ERMAKF_CITY = Experiment(
         "The paper's field data are not public; sensors, rates and the times of foliage and buildings are the paper's, the "
         "errors of the ranges are the scenario's, and both places come back after ten and twenty minutes.",
         "Published figures are of one drive. Orders and ratios can be compared, metres cannot.",
-        "No innovation gate, as in the paper: what an adapter does not weigh down goes into the state.",
-        "Heading at the start is that of the reference with the default standard deviation.",
+        *NOTES,
     ),
 )

@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
-from navreplay.options import AlignmentOptions, FilterOptions, GateOptions
 from pipelines.experiment import Arm, Experiment, NoiseClaim, Stretch
+from pipelines.experiments.ungated_ranges import NOTES, ungated_options
 from synthetic_logs.scenarios import SCENARIOS
 from synthetic_logs.surroundings import Surroundings
 
@@ -29,12 +29,7 @@ REDUNDANT_NOISE = Experiment(
     description="R estimated against R true in white, step and correlated noise (tightly coupled)",
     paper="Ge et al., Sensors 20 (2020) 6041, sections 3 and 4",
     scenario=_SCENARIO,
-    options=FilterOptions(
-        imu_noise=_SCENARIO.imu.noise,
-        alignment=AlignmentOptions("reference"),
-        gate=GateOptions(probability=1.0),
-        output_rate=2.0,
-    ),
+    options=ungated_options(_SCENARIO),
     arms=(
         Arm("fixed", "fixed"),
         Arm("iae", "iae"),
@@ -62,7 +57,6 @@ REDUNDANT_NOISE = Experiment(
     notes=(
         "Judged is the second minute of every kind of noise, when windows of 30 and 60 s hold nothing of the kind before.",
         "Multipath is Gauss-Markov with 20 s, of 5 m and 0.25 m/s beside white noise of 0.8 m and 0.05 m/s.",
-        "No innovation gate, as in the paper: what an adapter does not weigh down goes into the state.",
-        "Heading at the start is that of the reference with the default standard deviation.",
+        *NOTES,
     ),
 )
