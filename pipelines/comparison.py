@@ -138,12 +138,19 @@ def _error_table(report: Report, quantity: str, stretch: str) -> Table:
             continue
         unit = table["unit"]
         components = tuple(name for name in table if name != "unit")
-        figures = [figure_text(table[name][statistic]) for name in components for statistic in ("rms", "p95")]
+        figures = [figure_text(table[name][statistic]) for name in components for statistic in _statistics(name)]
         if table[components[0]]["count"]:
             rows.append((label, *figures, str(table[components[0]]["count"])))
-    heads = [f"{name.replace('3d', '3-D')} {statistic}" for name in components for statistic in ("rms", "95 %")]
+    heads = [f"{name.replace('3d', '3-D')} {word}" for name in components for word in _statistics(name).values()]
     title = f"{quantity.capitalize()} error {_STRETCHES[stretch]} [{unit}]"
     return Table(title, ("method", *heads, "epochs"), tuple(rows))
+
+
+def _statistics(component: str) -> dict[str, str]:
+    """What is told of a component, and in which word: of the length of an error more than of its parts."""
+    if component in ("horizontal", "3d"):
+        return {"rms": "rms", "p50": "median", "p95": "95 %", "max": "max"}
+    return {"rms": "rms", "p95": "95 %"}
 
 
 def _outage_table(report: Report) -> Table:

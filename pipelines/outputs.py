@@ -27,6 +27,9 @@ from pipelines.whole_file import write_whole
 
 __all__ = ["write_comparison", "write_each", "write_outputs"]
 
+_LONGEST_NAMES = 60
+"""Names of runs that a title holds [characters]."""
+
 
 def write_outputs(result: RunResult, out_dir: Path) -> dict[str, Path]:
     """Writes solution.csv, report.json, report.md, report.html, config.toml, config.estimated.toml where the method estimated
@@ -100,7 +103,8 @@ def write_comparison(comparison: Comparison, out_dir: Path) -> dict[str, Path]:
 
 def _name_runs(comparison: Comparison) -> str:
     labels = [variant.label for variant, _ in comparison.reports]
-    return ", ".join(labels) if len(labels) <= MOST_DRAWN else f"{len(labels)} runs"
+    text = ", ".join(labels)
+    return text if len(text) <= _LONGEST_NAMES else f"{len(labels)} runs"
 
 
 def _title(result: RunResult) -> tuple[str, str]:
