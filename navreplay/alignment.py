@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from navreplay import earth, rotation
-from navreplay.ground_motion import find_motion, find_standstill, window_fit
+from navreplay.ground_motion import find_initial_standstill, find_motion, window_fit
 from navreplay.heading import Heading, Sources, course_heading, gyrocompass, known_heading, match_course, unknown_heading
 from navreplay.strapdown import NavState, integrate_steps, make_steps
 from navreplay.timeline import Floats, LogError
@@ -56,7 +56,7 @@ def align(sources: Sources) -> Alignment:
         raise LogError("alignment: no position fix lies inside the IMU's time span; check the time bases and time offsets")
     moving = find_motion(fixes, options.min_speed)
     first = int(candidates[0])
-    still_until = find_standstill(imu, fixes)
+    still_until = find_initial_standstill(imu, fixes)
     if still_until > fixes.t_ns[first]:
         return _align_at_rest(sources, first, still_until, moving)
     needs_course = options.method in ("auto", "course", "gyrocompass") and options.given is None and sources.attitude is None

@@ -5,7 +5,7 @@ import numpy as np
 from navreplay import earth
 from navreplay.timeline import Floats, GnssFixSeries, ImuSeries, LogError
 
-__all__ = ["find_motion", "find_standstill", "fix_velocity", "window_fit"]
+__all__ = ["find_initial_standstill", "find_motion", "fix_velocity", "window_fit"]
 
 _STILL_SPEED = 0.4
 _STILL_RATE = np.radians(0.6)
@@ -38,7 +38,7 @@ def find_motion(fixes: GnssFixSeries, speed: float) -> np.ndarray:
     return np.asarray(np.hypot(velocity[:, 0], velocity[:, 1]) > speed)
 
 
-def find_standstill(imu: ImuSeries, fixes: GnssFixSeries) -> int:
+def find_initial_standstill(imu: ImuSeries, fixes: GnssFixSeries) -> int:
     """Time until which the vehicle stands still from the IMU's first sample on; that sample's time when it does not.
 
     Still means: GNSS slow, and half-second means of rate and specific force near those of the beginning. A first speed that a

@@ -16,18 +16,23 @@ from navreplay.timeline import Floats, GnssFixSeries, ImuSeries, Times
 __all__ = ["Standstill", "find_standstills"]
 
 _WINDOW_NS = 1_000_000_000
+"""Over which the IMU's noise is judged."""
 _FEWEST_SAMPLES = 5
+_LEAST_COVERED = 0.9
+"""Of the samples that a second of standstill should hold."""
 _AT_REST = 0.2
+"""Horizontal speed [m/s] below which fixes are known at rest."""
 _IN_MOTION = 0.5
-"""Speeds [m/s] below and above which fixes decide."""
+"""Speed [m/s] above which they are known in motion."""
 _FEWEST = 20
 """Fixes of either sort without which nothing is decided."""
 _LEAST_FOUND = 0.25
 """Share of the fixes at rest that the IMU must recognise, or it is not asked."""
 _MOST_REST = 0.95
+"""No louder is standstill than this share of the seconds known at rest."""
 _LEAST_MOTION = 0.001
 _MARGIN = 2.0
-"""Energies of motion are taken to be smaller by this factor than their lowest thousandth in the log."""
+"""Nor louder than the quietest thousandth of the seconds known in motion over this ratio of variances."""
 
 
 class Standstill(NamedTuple):
@@ -43,6 +48,8 @@ def find_standstills(imu: ImuSeries, fixes: GnssFixSeries, t_ns: Times) -> Stand
     known = np.isfinite(spreads).all(axis=1)
     at_rest, in_motion = spreads[known & (speed < _AT_REST)], spreads[known & (speed > _IN_MOTION)]
     none = np.empty(0, np.int64)
+    if not fixes.has_velocity.any():
+        return Standstill(none, "the fixes hold no velocities, from which rest is known: standstill cannot be told")
     if min(len(at_rest), len(in_motion)) < _FEWEST:
         return Standstill(
             none, f"{len(at_rest)} fixes at rest and {len(in_motion)} in motion: too few to tell standstill by the IMU"
@@ -85,7 +92,8 @@ def _spreads(imu: ImuSeries, t_ns: Times) -> Floats:
         mean = (total[ends] - total[starts]) / np.maximum(count, 1)
         variance = (squares[ends] - squares[starts]) / np.maximum(count, 1) - mean**2
         columns.append(np.sqrt(np.maximum(variance.sum(axis=1), np.finfo(np.float64).tiny)))
-    whole = (count[:, 0] >= _FEWEST_SAMPLES) & (t_ns >= imu.t_ns[0] + _WINDOW_NS) & (t_ns <= imu.t_ns[-1])
+    expected = _WINDOW_NS / float(np.median(np.diff(imu.t_ns)))
+    whole = (count[:, 0] >= max(_FEWEST_SAMPLES, _LEAST_COVERED * expected)) & (t_ns >= imu.t_ns[0] + _WINDOW_NS)
     return np.where(whole[:, None], np.stack(columns, axis=1), np.nan)
 
 

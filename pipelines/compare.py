@@ -16,6 +16,7 @@ from pipelines.spec import Config
 __all__ = ["Outcome", "Setting", "Variant", "compare", "name_methods", "number_equal", "plan_variants"]
 
 _SLOW = ("ml-ga", "mlckf-ga")
+_LONGEST_FOLDER = 80
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +72,7 @@ def plan_variants(names: Sequence[str], settings: Sequence[Setting]) -> tuple[Va
     """
     pairs = [(name, setting) for name in names for setting in settings]
     labels = number_equal([_label(name, setting) for name, setting in pairs])
-    folders = number_equal([re.sub(r"[^\w.+-]+", "-", label) for label in labels])
+    folders = number_equal([re.sub(r"[^\w.+-]+", "-", label)[:_LONGEST_FOLDER] for label in labels])
     variants = tuple(
         Variant(label, folder, _with_filter(setting, name), setting)
         for label, folder, (name, setting) in zip(labels, folders, pairs, strict=True)

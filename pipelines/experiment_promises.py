@@ -39,7 +39,7 @@ def judge_promises(
 
 
 def _verdict(ratio: Mapping[str, float], most: float) -> str:
-    if abs(ratio["mean"] - most) < ratio["half_width"]:
+    if not abs(ratio["mean"] - most) >= ratio["half_width"]:  # of one seed the interval is unknown
         return "undecided"
     return "kept" if ratio["mean"] <= most else "broken"
 

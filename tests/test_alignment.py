@@ -8,7 +8,7 @@ import pytest
 import synthetic_logs
 from navreplay import earth, rotation
 from navreplay.alignment import align, level
-from navreplay.ground_motion import find_motion, find_standstill
+from navreplay.ground_motion import find_initial_standstill, find_motion
 from navreplay.heading import Sources
 from navreplay.options import GRADES, AlignmentOptions, ImuNoise
 from navreplay.timeline import AttitudeSeries, GnssFixSeries, ImuSeries, LogError
@@ -54,12 +54,12 @@ def test_level_of_a_tilted_body():
 def test_standstill_ends_when_the_car_sets_off(car):
     speed = np.hypot(*car.truth.vel_n[:, :2].T)
     sets_off = car.truth.t_ns[np.argmax(speed > 0.05)]
-    assert abs(find_standstill(car.imu, car.fixes) - sets_off) < 3_000_000_000
+    assert abs(find_initial_standstill(car.imu, car.fixes) - sets_off) < 3_000_000_000
 
 
 def test_no_standstill_in_motion(car):
     moving = after(car, 45)
-    assert find_standstill(moving.imu, moving.fixes) == moving.imu.t_ns[0]
+    assert find_initial_standstill(moving.imu, moving.fixes) == moving.imu.t_ns[0]
 
 
 def test_constant_cruise_is_not_taken_for_a_standstill():
@@ -71,7 +71,7 @@ def test_constant_cruise_is_not_taken_for_a_standstill():
     lla = earth.move_lla(np.array([0.8, 0.1, 0.0]), 30.0 * np.arange(k)[:, None] * [1.0, 0, 0])
     unknown = np.full((k, 3, 3), np.nan)
     fixes = GnssFixSeries(t[::100][:k], lla, np.full((k, 3), np.nan), unknown, unknown, np.ones(k, dtype=np.int8))
-    assert find_standstill(imu, fixes) <= t[200]
+    assert find_initial_standstill(imu, fixes) <= t[200]
 
 
 def test_uniform_flight_is_no_standstill_however_noisy_its_positions():
@@ -80,7 +80,7 @@ def test_uniform_flight_is_no_standstill_however_noisy_its_positions():
         log = synthetic_logs.simulate(synthetic_logs.with_duration(SPIRAL, 30.0), seed)
         told = np.tile(np.diag(np.square([10.0, 10.0, 16.0])), (len(log.fixes), 1, 1))
         fixes = replace(without_velocity(log.fixes), cov_pos=told)
-        assert find_standstill(log.imu, fixes) == log.imu.t_ns[0]
+        assert find_initial_standstill(log.imu, fixes) == log.imu.t_ns[0]
 
 
 def test_course_alignment_reaches_back_to_the_standstill(car):

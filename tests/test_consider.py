@@ -1,6 +1,7 @@
 """Consider parameters: against the printed equations, their limits, coverage of biases, and runs of every kind."""
 
 from dataclasses import replace
+from time import process_time
 
 import numpy as np
 import pytest
@@ -291,6 +292,14 @@ def test_tightly_coupled_with_and_without_imu(ranges, name):
 def test_smoothing_is_refused(log):
     with pytest.raises(LogError, match=r"'eckf' considers biases .* cannot be smoothed; set filter.smooth = false"):
         run_filter(log.timeline(), build_method("eckf"), options(smooth=True))
+
+
+def test_smoothing_is_refused_before_a_calibration_and_names_what_to_change(log):
+    chosen = options(smooth=True, consider=replace(ALL_BIASES, every_method=True))
+    begin = process_time()
+    with pytest.raises(LogError, match=r"set filter.smooth = false, or consider.every_method = false"):
+        run_filter(log.timeline(), build_method("auto"), chosen)
+    assert process_time() - begin < 0.5
 
 
 def test_a_bank_is_refused(log):

@@ -131,14 +131,49 @@ def test_without_an_imu_it_is_told_that_nothing_comes_of_it():
 
 
 @pytest.mark.parametrize("name", PRESETS)
-def test_every_method_takes_standstill_beside_fixes(log, name):
+def test_every_method_takes_standstill_beside_fixes_as_it_is_told(log, name):
     if name in ("ml-ga", "mlckf-ga"):
         pytest.skip("minutes long, and of the same update as ml and mlckf")
     timeline = replace(log.timeline(), imu=shaken(log))
     solution = run_filter(timeline, build_method(name), told_options(vehicle=STANDING, output_rate=1.0))
     standing = next(series for series in solution.innovations if series.kind == "standstill")
     assert standing.used.mean() > 0.9
+    np.testing.assert_allclose(standing.noise_std, STANDING.zero_velocity_std, rtol=1e-12)
     assert np.linalg.norm(solution.vel_n[np.searchsorted(solution.t_ns, standing.t_ns[standing.used])], axis=1).max() < 0.3
+
+
+@pytest.mark.parametrize("name", ["auto", "em-offline"])
+def test_standstill_teaches_no_noise(log, name):
+    """The IMU is quietest at rest, and zero has no noise: what a calibration finds is that of the drive without it."""
+    timeline = replace(log.timeline(), imu=shaken(log))
+    without, standing = (
+        run_filter(timeline, build_method(name), told_options(vehicle=vehicle)) for vehicle in (VehicleOptions(), STANDING)
+    )
+    assert standing.estimated == without.estimated
+    errors = [evaluate(solution, log.truth).errors for solution in (without, standing)]
+    rms = [np.sqrt((error["velocity"].error ** 2).mean()) for error in errors]
+    assert rms[1] < rms[0]
+    assert errors[1]["velocity"].nees.mean() < 5
+
+
+def test_an_imu_with_a_gap_shows_no_standstill_in_it(log):
+    """From just before the car sets off the IMU is silent for a second."""
+    imu = shaken(log)
+    speed = speed_at(log, imu.t_ns)
+    sets_off = imu.t_ns[np.flatnonzero((speed[1:] > 0.01) & (speed[:-1] <= 0.01))[0]]
+    kept = (imu.t_ns < sets_off - SECOND // 10) | (imu.t_ns > sets_off + SECOND)
+    silent = ImuSeries(imu.t_ns[kept], imu.gyro[kept], imu.accel[kept], imu.increments)
+    found = find_standstills(silent, log.timeline().fixes, imu.t_ns).t_ns
+    assert speed_at(log, found).max() < 0.05
+    assert not ((found > sets_off + SECOND // 10) & (found <= sets_off + SECOND)).any()
+
+
+def test_fixes_without_velocity_claim_nothing_and_say_why(log):
+    fixes = log.timeline().fixes
+    positions = replace(fixes, vel_n=np.full_like(fixes.vel_n, np.nan), cov_vel=np.full_like(fixes.cov_vel, np.nan))
+    found = find_standstills(shaken(log), positions, log.imu.t_ns[::20])
+    assert len(found.t_ns) == 0
+    assert "hold no velocities" in found.text
 
 
 def test_a_wrong_standstill_is_refused_and_never_opens_the_filter():

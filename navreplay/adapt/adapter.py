@@ -1,11 +1,18 @@
 """What every noise adapter is: a choice of R (or of an inflated prior) inside the epoch, with a state of its own."""
 
+from collections.abc import Sequence
 from typing import Generic, NamedTuple, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from navreplay.filters.core import Gaussian, Innovation
 from navreplay.timeline import Floats
 
-__all__ = ["Adaptation", "NoiseAdapter"]
+__all__ = ["Adaptation", "NoiseAdapter", "adapt_measured", "is_measured"]
+
+_PSEUDO = "standstill"
+"""Kind of what no sensor has measured, and begin of its labels."""
 
 S = TypeVar("S")
 
@@ -29,3 +36,23 @@ class NoiseAdapter(Protocol[S]):
     def adapt(self, state: S, prior: Gaussian, innovation: Innovation) -> Adaptation[S]:
         """Choice for this epoch. Neither argument is changed."""
         ...
+
+
+def is_measured(names: Sequence[str]) -> NDArray[np.bool_]:
+    """(m,) whether a sensor has measured the components of these kinds or labels (m,)."""
+    return np.array([not name.startswith(_PSEUDO) for name in names])
+
+
+def adapt_measured(adapter: NoiseAdapter[S], state: S, prior: Gaussian, innovation: Innovation) -> Adaptation[S]:
+    """What an adapter chooses for the components that a sensor has measured. Standstill is no measurement with a noise to be
+    found, and keeps its R."""
+    measured = is_measured(innovation.labels)
+    if measured.all():
+        return adapter.adapt(state, prior, innovation)
+    if not measured.any():
+        return Adaptation(prior, innovation.noise, state)
+    rows = np.flatnonzero(measured)
+    chosen = adapter.adapt(state, prior, innovation.select(rows))
+    noise = innovation.noise.copy()
+    noise[rows[:, None], rows] = chosen.noise
+    return chosen._replace(noise=noise)

@@ -68,9 +68,9 @@ def fit_curve(curve: Floats, weights: Floats) -> Curve:
 
 
 def fit_variances(curves: Floats, weights: Floats, fitted: Curve) -> tuple[Floats, Floats]:
-    """Variances (k,) with which the correlation of a fitted curve fits the curves (k, lags + 1) less its drift by least squares
-    with weights (k, lags + 1); and how much (k,) of what each
-    tells is there, were all its lags and its level of its greatest weight."""
+    """Variances (k,) with which the correlation of a fitted curve fits the curves (k, lags + 1), less its drift, by least
+    squares with weights (k, lags + 1); and the share (k,) of the weight that is there of what would be, if every lag and the
+    level had the largest one."""
     shape = lag_shape(fitted.correlation)
     present = weights @ shape**2
     left = np.maximum(curves - fitted.drift * _DRIFT, 0.0)

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from navreplay import _bank_kernel
+from navreplay.adapt.adapter import adapt_measured, is_measured
 from navreplay.adapt.fixed import Fixed
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.error_models.ned import Propagated
@@ -160,15 +161,21 @@ class Bank:
         """Prior and R (M, m, m) that the hypotheses' adapters choose; the stack itself where nothing can be chosen."""
         rule, adapter = self._method.rule, self._method.adapter
         if isinstance(adapter, Fixed):
-            return self._stack, measurement.noise * self._r_scales[:, None, None]
+            return self._stack, self._scale(measurement)
         priors, noises = [], []
+        scaled = self._scale(measurement)
         for j, prior in enumerate(map(Gaussian, *self._stack)):
-            told = measurement._replace(noise=measurement.noise * self._r_scales[j])
+            told = measurement._replace(noise=scaled[j])
             innovation = rule.innovate(prior, told)._replace(t_ns=t_ns, leftover=self._leftovers[j])
-            adapted, noise, self._adapter_states[j] = adapter.adapt(self._adapter_states[j], prior, innovation)
+            adapted, noise, self._adapter_states[j] = adapt_measured(adapter, self._adapter_states[j], prior, innovation)
             priors.append(adapted)
             noises.append(noise)
         return Stack(np.array([p.mean for p in priors]), np.array([p.cov for p in priors])), np.array(noises)
+
+    def _scale(self, measurement: Measurement) -> Floats:
+        """(M, m, m) the told R of each hypothesis; that of standstill is not scaled."""
+        roots = np.where(is_measured(measurement.kinds), np.sqrt(self._r_scales)[:, None], 1.0)
+        return np.asarray(measurement.noise * roots[:, :, None] * roots[:, None, :])
 
     def _weigh(self, t_ns: int, log_likelihood: Floats) -> None:
         self._weights = self._weighting.weigh(self._weights, t_ns, log_likelihood)

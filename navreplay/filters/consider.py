@@ -30,7 +30,7 @@ from navreplay.options import FilterOptions
 from navreplay.strapdown import Leg, NavState
 from navreplay.timeline import Floats, LogError, Times
 
-__all__ = ["ConsideredAiding", "PartialTracker", "Schmidt", "Setup", "set_up"]
+__all__ = ["ConsideredAiding", "PartialTracker", "Schmidt", "Setup", "check_considers", "set_up"]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -146,23 +146,28 @@ class Setup(NamedTuple):
         return PartialTracker(self.aiding, gate, self.model, self.method, recorder, tracking)
 
 
-def set_up(aiding: Aiding, model: ErrorModel, method: Method, options: FilterOptions) -> Setup:
-    """What to run a method with on aiding and its error model; with consider parameters where method or options have them.
-
-    Raises LogError where these cannot be combined with the method or with smoothing.
-    """
+def check_considers(method: Method, options: FilterOptions) -> None:
+    """Raises LogError where consider parameters are asked for and cannot be combined with the method or with smoothing."""
     if not (method.considers or options.consider.every_method):
-        return Setup(aiding, model, method)
+        return
+    mend = "take a method without consider parameters" if method.considers else "consider.every_method = false"
     if options.smooth:
         raise LogError(
             f"filter: '{method.name}' considers biases that it does not estimate, and such a solution cannot be smoothed; set "
-            "filter.smooth = false, or take a method without consider parameters"
+            f"filter.smooth = false, or {mend}"
         )
     if not isinstance(method.rule, Linearised) or method.weighting is not None:
         raise LogError(
             f"filter: consider parameters need a single linearised filter, which '{method.name}' is not; set "
             "consider.every_method = false, or take 'eckf'"
         )
+
+
+def set_up(aiding: Aiding, model: ErrorModel, method: Method, options: FilterOptions) -> Setup:
+    """What to run a method with on aiding and its error model; with consider parameters where method or options have them,
+    as `check_considers` allows."""
+    if not (method.considers or options.consider.every_method):
+        return Setup(aiding, model, method)
     considered = ConsideredModel.of(model, options.consider)
     rule = Schmidt(method.rule, model.size, np.diagonal(considered.bias_cov))
     return Setup(ConsideredAiding(aiding, considered), considered, replace(method, rule=rule))

@@ -84,12 +84,12 @@ def choose_guidance(timeline: Timeline, options: FilterOptions, recorder: Record
     if attitude is not None:
         others.append(AttitudeAiding(attitude, main.model, options.attitude))
     if options.vehicle.zero_velocity:
-        others.append(_stand_still(timeline.imu, main, options.vehicle, recorder))
+        others.append(_aid_by_standstill(timeline.imu, main, options.vehicle, recorder))
     aiding: Aiding = JointAiding((main, *others)) if others else main
     return Guidance(main, tuple(others), aiding, model)
 
 
-def _stand_still(
+def _aid_by_standstill(
     imu: ImuSeries, main: FixAiding | RangeAiding, options: VehicleOptions, recorder: Recorder
 ) -> StandstillAiding:
     candidates = standstill_candidates(main.t_ns, int(imu.t_ns[0]), int(imu.t_ns[-1]))

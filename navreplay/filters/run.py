@@ -9,7 +9,7 @@ import numpy as np
 from navreplay.adapt.adapter import NoiseAdapter
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.filters.calibration import settle_nothing
-from navreplay.filters.consider import Setup, set_up
+from navreplay.filters.consider import Setup, check_considers, set_up
 from navreplay.filters.guidance import Guidance, choose_guidance
 from navreplay.filters.linear_log import LinearLog
 from navreplay.filters.presets import Method
@@ -39,6 +39,7 @@ def run_filter(timeline: Timeline, method: Method, options: FilterOptions, progr
     progress is called with the share done, from 0 to 1. Raises LogError without anything to aid by, or without IMU where there
     are only fixes; on a gap that the options refuse, or when no alignment is possible.
     """
+    check_considers(method, options)
     settled = settle_nothing(options, method.adapter)
     if method.calibration is not None:
         shares = iter(_share_out(progress, method.calibration.traces + 1))
@@ -46,7 +47,9 @@ def run_filter(timeline: Timeline, method: Method, options: FilterOptions, progr
         def trace(told: FilterOptions, adapter: NoiseAdapter[Any], sources: tuple[str, ...]) -> tuple[LinearLog, ...]:
             """What a forward pass with these linearises."""
             traces, plain = Traces(sources), replace(told.consider, every_method=False)
-            told = replace(told, output_rate=0.0, smooth=False, consider=plain)
+            # standstill has no noise to be found, and the IMU is quietest in it
+            moving = replace(told.vehicle, zero_velocity=False)
+            told = replace(told, output_rate=0.0, smooth=False, consider=plain, vehicle=moving)
             _run_passes(timeline, replace(method, adapter=adapter), told, traces, next(shares))
             return traces.linear_logs()
 
@@ -86,7 +89,7 @@ def _run_passes(
     guidance = choose_guidance(timeline, options, recorder)
     setup = set_up(guidance.aiding, guidance.model, method, options)
     stretches = cut_at_gaps(timeline.imu, options.gaps, recorder)
-    tell_unreached(guidance.aiding.t_ns, guidance.aiding.name, stretches, recorder)
+    tell_unreached(guidance.main.t_ns, guidance.main.name, stretches, recorder)
     report = _report_of(timeline.imu.t_ns, progress)
     rows = []
     for stretch in stretches:

@@ -1,4 +1,4 @@
-"""Aiding by standstill: a vehicle at rest has velocity zero (zero-velocity update; Groves (2013), 15.3)."""
+"""Aiding by standstill: a vehicle at rest has velocity zero (zero-velocity update, ZUPT; Groves (2013), 15.3)."""
 
 from dataclasses import replace
 

@@ -4,6 +4,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from navreplay.adapt.adapter import adapt_measured
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.error_models.ned import Propagated
 from navreplay.filters.core import Gaussian, Innovation, Leftover
@@ -132,7 +133,7 @@ class Updater:
         prior = Gaussian(self._zero, self._prior_covariance(cov, measurement))
         innovation = rule.innovate(prior, measurement)._replace(t_ns=t_ns, leftover=self._leftover)
         labels = innovation.labels
-        adapted, noise, self._adapter_state = adapter.adapt(self._adapter_state, prior, innovation)
+        adapted, noise, self._adapter_state = adapt_measured(adapter, self._adapter_state, prior, innovation)
         if adapted is not prior:
             innovation = rule.innovate(adapted, measurement)
         verdict = self._gate.judge(measurement.kinds, innovation, noise)

@@ -44,7 +44,8 @@ def _split_values(text: str) -> list[object]:
     try:
         return [_as_json(value) for value in tomllib.loads(f"values = [{text}]")["values"]]
     except tomllib.TOMLDecodeError:
-        return [value.strip() for value in text.split(",") if value.strip()]
+        values = [value.strip() for value in text.split(",")]
+        return list(values) if all(values) else []
 
 
 def _as_json(value: object) -> object:
