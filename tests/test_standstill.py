@@ -181,7 +181,7 @@ def test_a_wrong_standstill_is_refused_and_never_opens_the_filter():
     state = NavState.at(np.array([0.7, 0.1, 50.0]), np.array([10.0, 0.0, 0.0]), np.array([1.0, 0, 0, 0]))
     prior = Gaussian(np.zeros(15), np.eye(15) * 1e-4)
     measured = claimed.observe(0, state, prior.cov, np.zeros(3), 0.01).measurement
-    innovation, gate = Linearised().innovate(prior, measured), claimed.gate(GateOptions(reset_after=10))
+    innovation, gate = Linearised().innovate(prior, measured), claimed.gate(GateOptions(probability=1.0, reset_after=10))
     for _ in range(50):
         verdict = gate.judge(measured.kinds, innovation, innovation.noise)
         assert verdict.inflation == 1.0

@@ -1,7 +1,5 @@
 """Aiding by standstill: a vehicle at rest has velocity zero (zero-velocity update, ZUPT; Groves (2013), 15.3)."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from navreplay.error_models.error_model import ErrorModel
@@ -14,6 +12,8 @@ from navreplay.timeline import Floats, Times
 
 __all__ = ["StandstillAiding", "standstill_candidates"]
 
+_PROBABILITY = 0.9999
+"""Of a true standstill to pass the gate, at most."""
 _ALONE_NS = 1_000_000_000
 """Time between standstill epochs where nothing else is measured."""
 
@@ -36,9 +36,9 @@ class StandstillAiding:
         return Observed(measured._replace(kinds=("standstill",) * 3), state, cov)
 
     def gate(self, options: GateOptions) -> EpochGate:
-        """A gate of its own that never opens the filter: a refused standstill is a wrong one, not a filter that has lost its
-        way."""
-        return Gate(replace(options, reset_after=0))
+        """A gate of its own that is never switched off and never opens the filter: a refused standstill is a wrong one, not a
+        filter that has lost its way."""
+        return Gate(GateOptions(probability=min(options.probability, _PROBABILITY), reset_after=0))
 
 
 def standstill_candidates(main_ns: Times, start_ns: int, end_ns: int) -> Times:
