@@ -16,7 +16,8 @@ it is done per epoch.
 Assumes: noise of one correlation in all components of a kind, and told variances that are right relative to each other.
 Fails: where a bias is common to satellites (heights under an atmosphere unlike its model); with four satellites or fewer,
 and on position fixes, which show no level: noise that lasts and a drift of the INS are then not to be told apart, the drift is
-believed, and R is too small (half of it with 20 s, a quarter with 60 s); and for half a window after noise has changed. R
+believed, and R is too small (half of it with 20 s, a quarter with 60 s); for half a window after noise has changed; and where
+epochs of another sensor lie between those of the receiver, no difference is formed and the level alone is left. R
 says how large the errors are, not that they stay: a filter that takes correlated noise for white still believes their mean.
 """
 
