@@ -130,10 +130,9 @@ def test_without_an_imu_it_is_told_that_nothing_comes_of_it():
     assert any("zero_velocity is not used" in event.text for event in solution.events)
 
 
-@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize("name", [name for name in PRESETS if not name.endswith("-ga")])
 def test_every_method_takes_standstill_beside_fixes_as_it_is_told(log, name):
-    if name in ("ml-ga", "mlckf-ga"):
-        pytest.skip("minutes long, and of the same update as ml and mlckf")
+    """Those with a genetic algorithm take minutes, with the update of ml and mlckf."""
     timeline = replace(log.timeline(), imu=shaken(log))
     solution = run_filter(timeline, build_method(name), told_options(vehicle=STANDING, output_rate=1.0))
     standing = next(series for series in solution.innovations if series.kind == "standstill")
