@@ -93,9 +93,17 @@ def compare(paths: Sequence[Path], variants: Sequence[Variant], progress: Progre
 
 
 def number_equal(texts: Sequence[str]) -> tuple[str, ...]:
-    """The texts, numbered where one occurs twice."""
-    counts = Counter(texts)
-    return tuple(text if counts[text] == 1 else f"{text}-{texts[: i + 1].count(text)}" for i, text in enumerate(texts))
+    """The texts, numbered where one occurs twice; no two are equal."""
+    counts, taken, numbered = Counter(texts), set(texts), []
+    for i, text in enumerate(texts):
+        number = texts[: i + 1].count(text)
+        unique = text if counts[text] == 1 else f"{text}-{number}"
+        while unique != text and unique in taken:
+            number += 1
+            unique = f"{text}-{number}"
+        taken.add(unique)
+        numbered.append(unique)
+    return tuple(numbered)
 
 
 def _label(name: str, setting: Setting) -> str:

@@ -46,6 +46,7 @@ def test_all_stands_for_every_method_but_the_slow_ones(capsys: pytest.CaptureFix
 
 def test_equal_texts_are_numbered() -> None:
     assert number_equal(["fixed", "iae", "fixed"]) == ("fixed-1", "iae", "fixed-2")
+    assert number_equal(["a", "a", "a-1"]) == ("a-2", "a-3", "a-1")
 
 
 def test_every_method_runs_in_every_setting() -> None:
