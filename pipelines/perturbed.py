@@ -31,13 +31,7 @@ class Perturbed(Linearised):
     perturbations: tuple[Perturbation, ...]
     start_ns: int
 
-    def propagate(
-        self,
-        model: ErrorModel,
-        state: NavState,
-        cov: Floats,
-        leg: Leg,
-    ) -> Propagated:
+    def propagate(self, model: ErrorModel, state: NavState, cov: Floats, leg: Leg) -> Propagated:
         """From state and cov (n, n) to the nodes of a leg, the last an epoch's."""
         moved = model.propagate(state, cov, leg)
         t_s = (int(leg.steps.t_ns[leg.ends[-1] - 1]) - self.start_ns) / 1e9

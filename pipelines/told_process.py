@@ -21,13 +21,7 @@ class ToldProcess(Linearised):
     windows: tuple[ScaledWindow, ...]
     start_ns: int
 
-    def propagate(
-        self,
-        model: ErrorModel,
-        state: NavState,
-        cov: Floats,
-        leg: Leg,
-    ) -> Propagated:
+    def propagate(self, model: ErrorModel, state: NavState, cov: Floats, leg: Leg) -> Propagated:
         """From state and cov (n, n) to the nodes of a leg; noise is that at the last one."""
         if not isinstance(model, NedErrorModel):
             raise ValueError("the noise of the IMU can be told for its own error model alone")

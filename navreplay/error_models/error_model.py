@@ -43,12 +43,6 @@ class ErrorModel(Protocol):
 class MotionModel(ErrorModel, Protocol):
     """An error model that can carry others beside it."""
 
-    def propagate(
-        self,
-        state: NavState,
-        cov: Floats,
-        leg: Leg,
-        cross: Floats | None = None,
-    ) -> Propagated:
+    def propagate(self, state: NavState, cov: Floats, leg: Leg, cross: Floats | None = None) -> Propagated:
         """The same with cross (n, c), the covariance with other states, as if those did not move."""
         ...

@@ -76,13 +76,7 @@ class FreeMotionModel:
             parts.append(true.acceleration - computed.acceleration)
         return np.concatenate(parts)
 
-    def propagate(
-        self,
-        state: NavState,
-        cov: Floats,
-        leg: Leg,
-        cross: Floats | None = None,
-    ) -> Propagated:
+    def propagate(self, state: NavState, cov: Floats, leg: Leg, cross: Floats | None = None) -> Propagated:
         """From state and cov (n, n) to the nodes of a leg.
 
         Only the times of the steps are used, and the transition is exact over any interval. cross (n, c): covariance with

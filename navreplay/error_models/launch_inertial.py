@@ -28,13 +28,7 @@ class LaunchInertialModel(NedErrorModel):
     frame: LaunchFrame
     launch_ns: int
 
-    def propagate(
-        self,
-        state: NavState,
-        cov: Floats,
-        leg: Leg,
-        cross: Floats | None = None,
-    ) -> Propagated:
+    def propagate(self, state: NavState, cov: Floats, leg: Leg, cross: Floats | None = None) -> Propagated:
         """See `NedErrorModel.propagate`."""
         steps, part = leg.steps, leg.part
         times = np.append(steps.start_ns if leg.first == 0 else steps.t_ns[leg.first - 1], steps.t_ns[leg.ends - 1])

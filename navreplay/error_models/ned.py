@@ -157,13 +157,7 @@ class NedErrorModel:
             sensors.append(true.gyro_markov - computed.gyro_markov)
         return np.concatenate(motion + sensors)
 
-    def propagate(
-        self,
-        state: NavState,
-        cov: Floats,
-        leg: Leg,
-        cross: Floats | None = None,
-    ) -> Propagated:
+    def propagate(self, state: NavState, cov: Floats, leg: Leg, cross: Floats | None = None) -> Propagated:
         """From state and cov (n, n) to the nodes of a leg; cross (n, c): covariance with other states, as if these did not
         move.
         """

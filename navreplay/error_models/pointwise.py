@@ -32,13 +32,7 @@ class PointwiseModel(NedErrorModel):
 
     attitude_states: int = 4
 
-    def propagate(
-        self,
-        state: NavState,
-        cov: Floats,
-        leg: Leg,
-        cross: Floats | None = None,
-    ) -> Propagated:
+    def propagate(self, state: NavState, cov: Floats, leg: Leg, cross: Floats | None = None) -> Propagated:
         """From state and cov (n, n) to the nodes of a leg.
 
         The leg's interval is the longest step of the points, and of the linear model, whose accumulated noise is taken.

@@ -108,8 +108,7 @@ class Bank:
         self._zero = np.zeros(model.size)
 
     def propagate(self, state: NavState, cov: Floats, leg: Leg) -> Propagated:
-        """From state and the mixture's cov (n, n) to the nodes of a leg, where covariances
-        are the mixture's."""
+        """From state and the mixture's cov (n, n) to the nodes of a leg, where covariances are the mixture's."""
         self._share(cov)
         moved = self._model.propagate(state, cov, leg.keeping())
         self._stack = move_stack(self._stack, moved, self._q_scales, self._weights.values)

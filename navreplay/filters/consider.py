@@ -42,13 +42,7 @@ class Schmidt(Linearised):
     estimated: int
     told: Floats
 
-    def propagate(
-        self,
-        model: ErrorModel,
-        state: NavState,
-        cov: Floats,
-        leg: Leg,
-    ) -> Propagated:
+    def propagate(self, model: ErrorModel, state: NavState, cov: Floats, leg: Leg) -> Propagated:
         """From state and cov (n + p, n + p) to the nodes of a leg, by the rule within."""
         return self.rule.propagate(model, state, cov, leg)
 

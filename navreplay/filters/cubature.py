@@ -38,15 +38,8 @@ class Cubature(Linearised):
             given = self.attitude_states
             raise LogError(f"filter: attitude_states is 4 (additive quaternion) or 3 (rotation vector), got {given}")
 
-    def propagate(
-        self,
-        model: ErrorModel,
-        state: NavState,
-        cov: Floats,
-        leg: Leg,
-    ) -> Propagated:
-        """From state and cov (n, n) to the nodes of a leg; the state is moved to the mean of
-        the points at each."""
+    def propagate(self, model: ErrorModel, state: NavState, cov: Floats, leg: Leg) -> Propagated:
+        """From state and cov (n, n) to the nodes of a leg; the state is moved to the mean of the points at each."""
         return self._by_points(model).propagate(state, cov, leg)
 
     def _by_points(self, model: ErrorModel) -> ErrorModel:

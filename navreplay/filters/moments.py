@@ -16,13 +16,7 @@ __all__ = ["Linearised", "MomentRule"]
 class MomentRule(Protocol):
     """What the epoch loop asks of a moment rule."""
 
-    def propagate(
-        self,
-        model: ErrorModel,
-        state: NavState,
-        cov: Floats,
-        leg: Leg,
-    ) -> Propagated:
+    def propagate(self, model: ErrorModel, state: NavState, cov: Floats, leg: Leg) -> Propagated:
         """From state and cov (n, n) to the nodes of a leg (see `ErrorModel.propagate`)."""
         ...
 
@@ -39,13 +33,7 @@ class MomentRule(Protocol):
 class Linearised:
     """First order (extended Kalman filter): moments through the Jacobian at the nominal state."""
 
-    def propagate(
-        self,
-        model: ErrorModel,
-        state: NavState,
-        cov: Floats,
-        leg: Leg,
-    ) -> Propagated:
+    def propagate(self, model: ErrorModel, state: NavState, cov: Floats, leg: Leg) -> Propagated:
         """From state and cov (n, n) to the nodes of a leg, by the model's transition."""
         return model.propagate(state, cov, leg)
 
