@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from navreplay.ground_motion import fix_velocity
+from navreplay import earth
 from navreplay.timeline import Floats, GnssFixSeries, ImuSeries, Times
 
 __all__ = ["Standstill", "find_standstills"]
@@ -24,6 +24,11 @@ _AT_REST = 0.2
 """Horizontal speed [m/s] below which fixes are known at rest."""
 _IN_MOTION = 0.5
 """Speed [m/s] above which they are known in motion."""
+_SPEED_STD = 0.05
+"""Of a speed that positions tell [m/s], at most."""
+_LONGEST_S = 10.0
+_LEAST_LEVER = 1e-6
+"""Of five times against their mean, squared and summed up [s^2]: less is no time at all."""
 _FEWEST = 20
 """Fixes of either sort without which nothing is decided."""
 _LEAST_FOUND = 0.25
@@ -48,8 +53,9 @@ def find_standstills(imu: ImuSeries, fixes: GnssFixSeries, t_ns: Times) -> Stand
     known = np.isfinite(spreads).all(axis=1)
     at_rest, in_motion = spreads[known & (speed < _AT_REST)], spreads[known & (speed > _IN_MOTION)]
     none = np.empty(0, np.int64)
-    if not fixes.has_velocity.any():
-        return Standstill(none, "the fixes hold no velocities, from which rest is known: standstill cannot be told")
+    if not np.isfinite(speed).any():
+        text = "the fixes hold neither velocities nor positions precise enough to know rest from: standstill cannot be told"
+        return Standstill(none, text)
     if min(len(at_rest), len(in_motion)) < _FEWEST:
         return Standstill(
             none, f"{len(at_rest)} fixes at rest and {len(in_motion)} in motion: too few to tell standstill by the IMU"
@@ -66,12 +72,34 @@ def find_standstills(imu: ImuSeries, fixes: GnssFixSeries, t_ns: Times) -> Stand
 
 
 def _speed(fixes: GnssFixSeries) -> Floats:
-    """(k,) horizontal [m/s]; NaN where unknown, and where that of a neighbour says otherwise of rest or motion."""
-    velocity = fix_velocity(fixes)
-    speed = np.hypot(velocity[:, 0], velocity[:, 1])
-    around = np.lib.stride_tricks.sliding_window_view(np.pad(speed, 2, mode="edge"), 5)
+    """(k,) horizontal [m/s], the receiver's or that of precise positions; NaN where unknown, and where that of a neighbour says
+    otherwise of rest or motion."""
+    told = np.hypot(fixes.vel_n[:, 0], fixes.vel_n[:, 1])
+    speed = np.where(fixes.has_velocity, told, _position_speed(fixes))
+    around = _windows(speed)
     agree = (around < _AT_REST).all(axis=1) | (around > _IN_MOTION).all(axis=1)
     return np.where(agree, speed, np.nan)
+
+
+def _position_speed(fixes: GnssFixSeries) -> Floats:
+    """(k,) horizontal [m/s], slopes of five positions each by least squares; NaN where these are not told to be precise enough
+    for it, or lie further apart than a few seconds."""
+    t_s = (fixes.t_ns - fixes.t_ns[0]) / 1e9
+    known = np.flatnonzero(fixes.has_position)
+    way = np.full((len(fixes), 2), np.nan)
+    way[known] = earth.ned_between(fixes.lla[known[:1]], fixes.lla[known])[:, :2]
+    times = _windows(t_s)
+    arms = times - times.mean(axis=1, keepdims=True)
+    lever = np.maximum((arms**2).sum(axis=1), _LEAST_LEVER)
+    slopes = np.stack([(arms * _windows(axis)).sum(axis=1) for axis in way.T]) / lever
+    std = np.sqrt(np.trace(fixes.cov_pos[:, :2, :2], axis1=1, axis2=2) / 2 / lever)
+    good = (std < _SPEED_STD) & (np.ptp(times, axis=1) < _LONGEST_S)
+    return np.where(good, np.hypot(*slopes), np.nan)
+
+
+def _windows(values: Floats) -> Floats:
+    """(k, 5) each of values (k,) with two neighbours on either side, the ends repeated."""
+    return np.lib.stride_tricks.sliding_window_view(np.pad(values, 2, mode="edge"), 5)
 
 
 def _energy(spreads: Floats, unit: Floats) -> Floats:

@@ -12,7 +12,7 @@ class VehicleSection(Section):
     """What is known of the vehicle's motion."""
 
     zero_velocity: bool = Field(
-        False, description="zero-velocity updates (ZUPT) where the IMU is as quiet as while fixes with velocity show rest"
+        False, description="zero-velocity updates (ZUPT) where the IMU is as quiet as while fixes show rest"
     )
     zero_velocity_std_mps: Positive = Field(0.01, description="standard deviation of that zero [m/s]")
 

@@ -5,6 +5,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from navreplay import earth
 from navreplay.error_models.ned import NedErrorModel
 from navreplay.filters.core import Gaussian
 from navreplay.filters.moments import Linearised
@@ -167,12 +168,26 @@ def test_an_imu_with_a_gap_shows_no_standstill_in_it(log):
     assert not ((found > sets_off + SECOND // 10) & (found <= sets_off + SECOND)).any()
 
 
-def test_fixes_without_velocity_claim_nothing_and_say_why(log):
-    fixes = log.timeline().fixes
-    positions = replace(fixes, vel_n=np.full_like(fixes.vel_n, np.nan), cov_vel=np.full_like(fixes.cov_vel, np.nan))
-    found = find_standstills(shaken(log), positions, log.imu.t_ns[::20])
+def without_velocity(fixes):
+    return replace(fixes, vel_n=np.full_like(fixes.vel_n, np.nan), cov_vel=np.full_like(fixes.cov_vel, np.nan))
+
+
+def test_coarse_fixes_without_velocity_claim_nothing_and_say_why(log):
+    found = find_standstills(shaken(log), without_velocity(log.timeline().fixes), log.imu.t_ns[::20])
     assert len(found.t_ns) == 0
-    assert "hold no velocities" in found.text
+    assert "neither velocities nor positions precise enough" in found.text
+
+
+def test_precise_positions_serve_where_there_is_no_velocity(log):
+    """As of an RTK receiver whose messages hold positions alone."""
+    fixes = without_velocity(log.timeline().fixes)
+    truth = truth_at(log.scenario.journey, fixes.t_ns)
+    noise = 0.02 * np.random.default_rng(3).standard_normal((len(fixes), 3))
+    precise = replace(fixes, lla=earth.move_lla(truth.lla, noise), cov_pos=np.tile(np.eye(3) * 4e-4, (len(fixes), 1, 1)))
+    t_ns = log.imu.t_ns[::20]
+    found = find_standstills(shaken(log), precise, t_ns).t_ns
+    assert speed_at(log, found).max() < 0.05
+    assert len(found) > 0.8 * len(find_standstills(shaken(log), log.timeline().fixes, t_ns).t_ns)
 
 
 def test_a_wrong_standstill_is_refused_and_never_opens_the_filter():
