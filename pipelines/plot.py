@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from navreplay.solution import Solution
+from navreplay.solution import InnovationSeries, Solution
 from navreplay.timeline import Floats, Times
 from pipelines.svg import Panel, draw_time_panels
 
-__all__ = ["Legend", "Plot", "bend_of", "elapsed_s", "time_plot"]
+__all__ = ["Legend", "Plot", "bend_of", "elapsed_s", "has_noise_to_show", "time_plot"]
 
 Legend = tuple[tuple[str, str], ...]
 
@@ -41,6 +41,11 @@ def time_plot(
     """Panels over the time of a solution; shades and height as in `draw_time_panels`."""
     duration_s = float((solution.t_ns[-1] - solution.t_ns[0]) / 1e9)
     return Plot(title, note, legend, draw_time_panels(panels, duration_s, shades, height))
+
+
+def has_noise_to_show(series: InnovationSeries) -> bool:
+    """Whether its noise is more than one number: it changes, or is not that told."""
+    return bool(np.ptp(series.noise_std) or (series.noise_std != series.nominal_std).any())
 
 
 def bend_of(*series: Floats) -> float | None:

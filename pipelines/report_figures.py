@@ -10,7 +10,7 @@ from navreplay.rotation import euler_from_quat
 from navreplay.solution import InnovationSeries, Solution
 from navreplay.timeline import FixStatus, Floats, Timeline
 from pipelines.angles import suit_errors, suit_innovations
-from pipelines.plot import Legend, Plot, bend_of, elapsed_s, time_plot
+from pipelines.plot import Legend, Plot, bend_of, elapsed_s, has_noise_to_show, time_plot
 from pipelines.report import outage_errors
 from pipelines.result import RunResult
 from pipelines.sky_figures import plot_satellites, plot_shared_noise, sky_plots
@@ -40,7 +40,8 @@ def report_plots(result: RunResult) -> tuple[Plot, ...]:
     measured = [series for series in solution.innovations if len(series.t_ns)]
     for series in measured:
         noise = plot_shared_noise if series.sources else _plot_noise
-        plots += [_plot_innovations(series, solution, shades), noise(series, solution, shades)]
+        plots.append(_plot_innovations(series, solution, shades))
+        plots += [noise(series, solution, shades)] if has_noise_to_show(series) else []
     plots += [plot_satellites(series, solution, shades) for series in measured if series.sources]
     if solution.weights is not None:
         plots.append(plot_weights(solution.weights, solution, shades))

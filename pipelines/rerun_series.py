@@ -5,6 +5,7 @@ import rerun as rr
 
 from navreplay.solution import InnovationSeries, Solution
 from pipelines.angles import suit_errors, suit_innovations
+from pipelines.plot import has_noise_to_show
 from pipelines.rerun_layout import Stack
 from pipelines.rerun_paint import BLUE, GREEN, GREY, ORANGE, PALE, RED, send_dots, send_line, time_columns
 from pipelines.rerun_sky import send_satellite_innovations, send_shared_noise
@@ -33,7 +34,8 @@ def list_stacks(result: RunResult) -> tuple[Stack, ...]:
         kind = innovations.kind
         labels, unit = () if innovations.sources else innovations.labels, suit_innovations(innovations).unit
         stacks.append(Stack(f"Innovations: {kind}", f"/innovations/{kind}", labels, unit))
-        stacks.append(Stack(f"Noise: {kind}", f"/noise/{kind}", labels, unit))
+        if has_noise_to_show(innovations):
+            stacks.append(Stack(f"Noise: {kind}", f"/noise/{kind}", labels, unit))
     if result.solution.weights is not None:
         stacks.append(Stack("Weights", "/weights", ("bank",), "1"))
     stacks.append(Stack("Gyro bias", "/bias/gyro", ("x", "y", "z"), "deg/h"))

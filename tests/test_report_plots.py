@@ -1,14 +1,16 @@
 """Scales, ticks and thinning of the plots."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from navreplay.solution import InnovationSeries
 from pipelines.mean_figures import draw_means
-from pipelines.plot import bend_of
+from pipelines.plot import bend_of, has_noise_to_show
 from pipelines.scales import Scale, find_breaks, log_ticks, nice_ticks, thin_band, thin_line, time_label, time_ticks
 from pipelines.svg import Layer, Panel, draw_map, draw_time_panels
 
@@ -129,3 +131,15 @@ def test_no_line_leads_across_a_gap() -> None:
     path = re.search(r'class="line c1"[^>]* d="([^"]*)"', drawing)
     assert path is not None
     assert path[1].count("M") == 2
+
+
+def test_noise_is_shown_where_it_changes_or_is_not_that_told() -> None:
+    ones = np.full((4, 3), 0.01)
+    series = InnovationSeries(
+        *("standstill", ("north", "east", "down"), "m/s", np.arange(4), 0 * ones, ones, ones, ones),
+        *(np.zeros(4), np.ones(4, dtype=np.bool_), ("",) * 4),
+    )
+    assert not has_noise_to_show(series)
+    assert has_noise_to_show(replace(series, noise_std=2 * ones))
+    changing = ones * np.arange(1, 5)[:, None]
+    assert has_noise_to_show(replace(series, noise_std=changing, nominal_std=changing))
