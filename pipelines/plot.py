@@ -44,8 +44,8 @@ def time_plot(
 
 
 def has_noise_to_show(series: InnovationSeries) -> bool:
-    """Whether its noise is more than one number: it changes, or is not that told."""
-    return bool(np.ptp(series.noise_std) or (series.noise_std != series.nominal_std).any())
+    """Whether its noise is more than one number: of several sources, changing, or not that told."""
+    return bool(series.sources or np.ptp(series.noise_std) or (series.noise_std != series.nominal_std).any())
 
 
 def bend_of(*series: Floats) -> float | None:
