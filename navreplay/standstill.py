@@ -18,6 +18,8 @@ __all__ = ["Standstill", "find_standstills"]
 _WINDOW_NS = 1_000_000_000
 """Over which the IMU's noise is judged."""
 _FEWEST_SAMPLES = 5
+_LEAST_VARIANCE = 1e-18
+"""Of a simulated sensor without noise."""
 _LEAST_COVERED = 0.9
 """Of the samples that a second of standstill should hold."""
 _AT_REST = 0.2
@@ -119,7 +121,7 @@ def _spreads(imu: ImuSeries, t_ns: Times) -> Floats:
         total, squares = _running_sum(centred), _running_sum(centred**2)
         mean = (total[ends] - total[starts]) / np.maximum(count, 1)
         variance = (squares[ends] - squares[starts]) / np.maximum(count, 1) - mean**2
-        columns.append(np.sqrt(np.maximum(variance.sum(axis=1), np.finfo(np.float64).tiny)))
+        columns.append(np.sqrt(np.maximum(variance.sum(axis=1), _LEAST_VARIANCE)))
     expected = _WINDOW_NS / float(np.median(np.diff(imu.t_ns)))
     whole = (count[:, 0] >= max(_FEWEST_SAMPLES, _LEAST_COVERED * expected)) & (t_ns >= imu.t_ns[0] + _WINDOW_NS)
     return np.where(whole[:, None], np.stack(columns, axis=1), np.nan)
