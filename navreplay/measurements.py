@@ -39,6 +39,16 @@ class Measurement(NamedTuple):
     kinds: tuple[str, ...]
     labels: tuple[str, ...]
 
+    def select(self, rows: np.ndarray) -> "Measurement":
+        """The components with index in rows (k,)."""
+        return Measurement(
+            self.residual[rows],
+            self.jacobian[rows],
+            self.noise[rows[:, None], rows],
+            tuple(self.kinds[i] for i in rows),
+            tuple(self.labels[i] for i in rows),
+        )
+
 
 class FixNoise(NamedTuple):
     """Told noise of every row of a fix series: position (k, 3, 3) [m^2] and velocity (k, 3, 3) [m^2/s^2], NED."""

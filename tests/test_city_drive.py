@@ -30,10 +30,11 @@ def test_errors_are_those_of_the_page(result):
     assert all(np.array(percentiles(total)[:2]) < [1.3, 2.8])
 
 
-def test_the_covariance_can_be_believed(result):
-    """3 expected; the constant biases that are reckoned with are told rather too large than too small."""
+def test_the_covariance_is_not_too_small(result):
+    """3 expected, and 76 without the biases that are reckoned with, which are told rather too large: most epochs lie below."""
     nees = result.evaluation.errors["position"].nees
-    assert 0.5 < np.nanmean(nees) < 4.0
+    assert np.nanmean(nees) < 3.0
+    assert np.nanmean(nees < 9.35) > 0.95
 
 
 def test_where_errors_are_largest_the_receiver_agrees_with_us(result):
@@ -42,8 +43,7 @@ def test_where_errors_are_largest_the_receiver_agrees_with_us(result):
     total = np.linalg.norm(evaluation.errors["position"].error, axis=1)
     worst = evaluation.t_ns[total > 10.0]
     assert 3 <= len(worst) <= 8
-    t_s = (worst - reference.t_ns[0]) / 1e9
-    assert t_s.max() - t_s.min() < 2
+    assert np.ptp(worst) < 2e9
     for t_ns in worst:
         receiver = fixes.lla[np.argmin(np.abs(fixes.t_ns - t_ns))]
         ours = solution.lla[np.argmin(np.abs(solution.t_ns - t_ns))]

@@ -14,9 +14,10 @@ from navreplay.filters.run import run_filter
 from navreplay.filters.standstill_aiding import StandstillAiding, standstill_candidates
 from navreplay.metrics import evaluate
 from navreplay.options import GRADES, FilterOptions, GateOptions, VehicleOptions
+from navreplay.rotation import quat_from_rotvec, quat_multiply
 from navreplay.standstill import find_standstills
 from navreplay.strapdown import NavState
-from navreplay.timeline import GnssFixSeries, ImuSeries, Timeline
+from navreplay.timeline import AttitudeSeries, GnssFixSeries, ImuSeries, Timeline
 from synthetic_logs import SCENARIOS, simulate, truth_at, with_duration
 
 SECOND = 1_000_000_000
@@ -140,6 +141,32 @@ def test_every_method_takes_standstill_beside_fixes_as_it_is_told(log, name):
     assert standing.used.mean() > 0.9
     np.testing.assert_allclose(standing.noise_std, STANDING.zero_velocity_std, rtol=1e-12)
     assert np.linalg.norm(solution.vel_n[np.searchsorted(solution.t_ns, standing.t_ns[standing.used])], axis=1).max() < 0.3
+
+
+def test_a_bank_is_not_weighed_by_standstill(log):
+    """Hypotheses of Q: the weights change where fixes are, not where zero velocity stands alone."""
+    timeline = replace(log.timeline(), imu=shaken(log))
+    resting = speed_at(log, timeline.fixes.t_ns) < 1e-3
+    stop = np.flatnonzero(resting[1:] & ~resting[:-1])[0] + 2
+    cut = replace(timeline, fixes=select(timeline.fixes, ~np.isin(np.arange(len(resting)), np.arange(stop, stop + 6))))
+    solution = run_filter(cut, build_method("mmae", {"q_scales": (0.1, 1.0, 10.0)}), told_options(vehicle=STANDING))
+    standing = next(series for series in solution.innovations if series.kind == "standstill")
+    assert len(np.setdiff1d(standing.t_ns, cut.fixes.t_ns)) >= 3
+    np.testing.assert_array_equal(np.setdiff1d(solution.weights.t_ns, cut.fixes.t_ns), [])
+
+
+def test_attitudes_and_standstill_stand_beside_fixes(log):
+    timeline = replace(log.timeline(), imu=shaken(log))
+    rng, t_ns = np.random.default_rng(1), timeline.fixes.t_ns[:-1] + SECOND // 4
+    truth = truth_at(log.scenario.journey, t_ns)
+    std = np.radians(0.5)
+    q = quat_multiply(quat_from_rotvec(std * rng.standard_normal((len(t_ns), 3))), truth.q_nb)
+    attitude = AttitudeSeries(t_ns, q, np.tile(np.eye(3) * std**2, (len(t_ns), 1, 1)), "navigation", False)
+    solution = run_filter(replace(timeline, attitude=attitude), build_method("fixed"), told_options(vehicle=STANDING))
+    used = {series.kind: series.used.mean() for series in solution.innovations}
+    assert set(used) == {"position", "velocity", "attitude", "standstill"}
+    assert min(used.values()) > 0.95
+    assert evaluate(solution, log.truth).errors["attitude"].nees.mean() < 6
 
 
 @pytest.mark.parametrize("name", ["auto", "em-offline"])

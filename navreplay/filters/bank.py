@@ -145,16 +145,25 @@ class Bank:
         if not len(verdict.passed):
             self._leave(t_ns, innovation.labels, measurement, self._stack.means)
             return Updated(state, cov, state, cov, RowStatus.REJECTED, observed)
-        passed = verdict.passed
-        part = measurement.residual[passed], measurement.jacobian[passed], noises[:, passed[:, None], passed]
-        updated = update_stack(prior, *part)
-        self._weigh(t_ns, updated.log_likelihood)
-        self._leave(t_ns, innovation.labels, measurement, updated.stack.means)
-        posterior = mix(updated.stack, self._weights.values)
-        self._stack = updated.stack._replace(means=updated.stack.means - posterior.mean)
+        stack = self._condition(t_ns, prior, measurement, noises, verdict.passed)
+        self._leave(t_ns, innovation.labels, measurement, stack.means)
+        posterior = mix(stack, self._weights.values)
+        self._stack = stack._replace(means=stack.means - posterior.mean)
         moved = self._model.retract(state, posterior.mean)
         self._mixed = symmetric(posterior.cov)
         return Updated(moved, self._mixed, state, mixture.cov, RowStatus.UPDATED, observed)
+
+    def _condition(self, t_ns: int, prior: Stack, measurement: Measurement, noises: Floats, passed: np.ndarray) -> Stack:
+        """The hypotheses given the components with index passed (k,), and weighed by those of them that a sensor has measured:
+        standstill says nothing of the noise in motion."""
+        stack, measured = prior, is_measured([measurement.kinds[i] for i in passed])
+        for rows, weighs in ((passed[measured], True), (passed[~measured], False)):
+            if len(rows):
+                part = measurement.residual[rows], measurement.jacobian[rows], noises[:, rows[:, None], rows]
+                stack, log_likelihood = update_stack(stack, *part)
+                if weighs:
+                    self._weigh(t_ns, log_likelihood)
+        return stack
 
     def _adapt(self, t_ns: int, measurement: Measurement) -> tuple[Stack, Floats]:
         """Prior and R (M, m, m) that the hypotheses' adapters choose; the stack itself where nothing can be chosen."""

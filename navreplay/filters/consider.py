@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from navreplay.adapt.adapter import is_measured
 from navreplay.adapt.partial_tracking import PartialTracking
 from navreplay.error_models.considered import ConsideredModel
 from navreplay.error_models.error_model import ErrorModel
@@ -114,6 +115,11 @@ class PartialTracker(Updater):
         return moved
 
     def _prior_covariance(self, cov: Floats, measurement: Measurement) -> Floats:
+        measured = is_measured(measurement.kinds)
+        if not measured.any():
+            return cov
+        if not measured.all():
+            measurement = measurement.select(np.flatnonzero(measured))
         inflated, self._tracked = self._tracking.inflate(self._tracked, cov, self._process, measurement)
         self._process = np.zeros_like(self._process)
         return inflated
