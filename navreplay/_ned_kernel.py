@@ -220,6 +220,25 @@ def _begin_totals(phi, decay, density, span, bridge, total_phi, total_q):
 
 
 @njit(cache=True)
+def _gather_totals(phi, decay, density, span, bridge, fresh, total_phi, total_q, work):
+    """Transition and noise of a node's interval, with one covariance step more; fresh: it is the interval's first."""
+    if fresh:
+        _begin_totals(phi, decay, density, span, bridge, total_phi, total_q)
+    else:
+        multiply_left(phi, decay, total_phi, work)
+        move_covariance(phi, decay, density, span, bridge, total_q, work)
+
+
+@njit(cache=True)
+def _clear(c_dt, f_dt, c_theta, c_dvel):
+    """Empties what `_accumulate` has summed up."""
+    c_dt[:, :] = 0
+    f_dt[:] = 0
+    c_theta[:, :] = 0
+    c_dvel[:, :] = 0
+
+
+@njit(cache=True)
 def propagate(
     start,
     p_start,
@@ -254,14 +273,8 @@ def propagate(
     phi = np.empty((9, n))
     work = np.empty((9, max(n, cross.shape[1])))
     decay = np.ones(n - 9)
-    c = np.empty((3, 3))
-    c_start = np.empty((3, 3))
-    dv_n = np.empty(3)
-    body = np.empty(6)
-    c_dt = np.zeros((3, 3))
-    c_theta = np.zeros((3, 3))
-    c_dvel = np.zeros((3, 3))
-    f_dt = np.zeros(3)
+    c, c_start, dv_n, body = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(6)
+    c_dt, f_dt, c_theta, c_dvel = np.zeros((3, 3)), np.zeros(3), np.zeros((3, 3)), np.zeros((3, 3))
     keep = transitions.shape[0] > 0
     fading = np.isfinite(tau).any()
     total_phi = np.eye(n)
@@ -292,18 +305,12 @@ def propagate(
             move_covariance(phi, decay, density, span, bridge, p, work)
             if cross.shape[1] > 0:
                 multiply_left(phi, decay, cross, work)
-            if keep and fresh:
-                _begin_totals(phi, decay, density, span, bridge, total_phi, total_q)
-            elif keep:
-                multiply_left(phi, decay, total_phi, work)
-                move_covariance(phi, decay, density, span, bridge, total_q, work)
+            if keep:
+                _gather_totals(phi, decay, density, span, bridge, fresh, total_phi, total_q, work)
             fresh = False
             span = 0.0
             bridge = 0.0
-            c_dt[:, :] = 0
-            f_dt[:] = 0
-            c_theta[:, :] = 0
-            c_dvel[:, :] = 0
+            _clear(c_dt, f_dt, c_theta, c_dvel)
         states[node] = x
         covariances[node] = p
         crosses[node] = cross
