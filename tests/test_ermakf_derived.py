@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from navreplay.adapt.lag_curve import Correlation, drift_shape, fit_curve, fit_variances, independent_values, lag_shape
-from navreplay.adapt.lag_memory import LAGS, extend_memory, forget
+from navreplay.adapt.lag_memory import LAGS, _epochs_before, extend_memory, forget
 from navreplay.adapt.redundancy import level_squares
 from navreplay.filters.core import Gaussian, Innovation, Leftover
 from navreplay.filters.presets import build_method
@@ -183,6 +183,14 @@ def test_lag_sums_equal_their_definition():
         expected = ((z[:, steps:] - z[:, : 60 - steps]) ** 2).sum(axis=1) / 2 / 4 * 0.5 if steps < 60 else np.zeros(2)
         np.testing.assert_allclose(memory.sums[:, :, column].sum(axis=0), expected)
         np.testing.assert_allclose(memory.weights[:, :, column].sum(axis=0), max(60 - steps, 0) * 0.5)
+
+
+@pytest.mark.parametrize(("step", "found"), [(1.0, 6), (0.2, 6), (1.5, 5), (1.02, 6)])
+def test_no_difference_counts_as_two_lags(step, found):
+    """At steps of 1.5 s nothing is a lag of 1 s."""
+    epochs = _epochs_before(-step * np.arange(int(40 / step), -1, -1))
+    known = [epoch for epoch in epochs if epoch >= 0]
+    assert len(known) == len(set(known)) == found
 
 
 @pytest.mark.parametrize("correlation", [Correlation(0.0, 1.0), Correlation(0.7, 20.0), Correlation(1.0, 5.0)])

@@ -86,12 +86,13 @@ def add_levels(
 
 
 def _epochs_before(t_s: Floats) -> list[int]:
-    """By lag the index of the epoch that lies it before the last of t_s (n,) [s], to half a step, -1 where there is none."""
+    """By lag the index of the epoch that lies it before the last of t_s (n,) [s], to half a step and a quarter of the lag, -1
+    where there is none."""
     if len(t_s) < 2:
         return [-1] * len(LAGS)
     after = np.clip(np.searchsorted(t_s, -LAGS), 1, len(t_s) - 1)
     nearest = np.minimum(np.where(-LAGS - t_s[after - 1] < t_s[after] + LAGS, after - 1, after), len(t_s) - 2)
-    found = np.abs(t_s[nearest] + LAGS) <= -0.5 * t_s[-2] + _ROUNDING
+    found = np.abs(t_s[nearest] + LAGS) <= np.minimum(-0.5 * t_s[-2], LAGS / 4) + _ROUNDING
     return np.where(found, nearest, -1).tolist()
 
 
