@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from navreplay import earth
-from navreplay.least_squares import fixes_of, solve_points
+from navreplay.geodesy import earth
+from navreplay.measurements.least_squares import fixes_of, solve_points
 from navreplay.options import RangeOptions
 from navreplay.timeline import Floats, LogError, Timeline, Times
-from pipelines.process import filter_drive, read_drive
-from pipelines.spec import load_config
+from pipelines.config.spec import load_config
+from pipelines.drive.process import filter_drive, read_drive
 
 FOLDER = Path(__file__).parent.parent / "examples" / "tsukishima_2020"
 PLAIN = ("vehicle.zero_velocity=false", "consider.every_method=false")

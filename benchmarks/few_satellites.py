@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from navreplay.atmosphere import look_angles
+from navreplay.measurements.atmosphere import look_angles
 from navreplay.timeline import RangeSeries, Timeline
-from pipelines.process import Drive, filter_drive, read_drive
-from pipelines.spec import Config, load_config
+from pipelines.config.spec import Config, load_config
+from pipelines.drive.process import Drive, filter_drive, read_drive
 
 FOLDER = Path(__file__).parent.parent / "examples" / "tsukishima_2020"
 STRETCHES_S = tuple((start, start + 30.0) for start in np.arange(130.0, 400.0, 55.0))

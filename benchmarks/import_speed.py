@@ -25,10 +25,10 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
-from importers.log import Log
-from importers.mcap_log import McapLog
-from importers.ros1_bag import Ros1Bag
-from importers.ros2_bag import Ros2Bag
+from importers.containers.mcap import McapLog
+from importers.containers.ros1_bag import Ros1Bag
+from importers.containers.ros2_bag import Ros2Bag
+from importers.rows.log import Log
 
 TYPE = "sensor_msgs/msg/Imu"
 RATE_HZ = 200
@@ -117,7 +117,7 @@ def cpu_seconds(run: Callable[[], object]) -> float:
 def peak_megabytes(path: Path) -> float:
     """Peak resident memory [MB] of a process that reads the MCAP, as Linux counts it."""
     program = (
-        "import re, sys; from importers.mcap_log import McapLog; log = McapLog(sys.argv[1]); log.read(('/imu',));"
+        "import re, sys; from importers.containers.mcap import McapLog; log = McapLog(sys.argv[1]); log.read(('/imu',));"
         "print(int(re.search(r'VmHWM:\\s+(\\d+)', open('/proc/self/status').read())[1]) / 1024)"
     )
     return float(subprocess.run([sys.executable, "-c", program, str(path)], capture_output=True, check=True, text=True).stdout)

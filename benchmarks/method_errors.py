@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import t
 
+from navreplay.evaluation.metrics import evaluate
 from navreplay.filters.presets import PRESETS, build_method
 from navreplay.filters.run import run_filter
-from navreplay.metrics import evaluate
 from navreplay.options import FilterOptions
 from navreplay.timeline import Timeline
 from synthetic_logs.scenarios import SCENARIOS

@@ -1,7 +1,7 @@
 """Readers of navigation logs: any supported file becomes series on one timeline.
 
 The public names below are loaded when they are first used, so that importing the package costs nothing. The checks of a
-timeline are `importers.preflight.preflight`.
+timeline are `importers.preflight.checks.preflight`.
 """
 
 from importlib import import_module

@@ -4,23 +4,23 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from importers.clock import leap_seconds
-from importers.csv_layouts import find_layout, read_layout
-from importers.csv_mapping import find_mapping, read_mapped
-from importers.csv_ranges import OWN_RANGES
-from importers.kf_gins import find_kf_gins, read_gnss, read_imu
-from importers.log import Log
-from importers.nmea import is_nmea, read_nmea
-from importers.rinex_navigation import is_rinex_navigation, read_rinex_navigation
-from importers.rinex_observation import is_rinex_observation, read_rinex_observation
-from importers.rtklib_pos import is_pos, read_pos
+from importers.rinex.navigation import is_rinex_navigation, read_rinex_navigation
+from importers.rinex.observation import is_rinex_observation, read_rinex_observation
+from importers.rinex.sp3 import is_sp3, read_sp3
+from importers.rows.clock import leap_seconds
+from importers.rows.log import Log
 from importers.settings import InputSettings
-from importers.smartphone_csv import is_smartphone, read_smartphone
-from importers.sp3 import is_sp3, read_sp3
-from importers.text_log import TextLog
-from importers.tum import is_tum, read_tum
-from importers.ubx import UbxLog, is_ubx
-from navreplay.time_scales import LEAP_SECONDS
+from importers.text.csv_layouts import find_layout, read_layout
+from importers.text.csv_mapping import find_mapping, read_mapped
+from importers.text.csv_ranges import OWN_RANGES
+from importers.text.kf_gins import find_kf_gins, read_gnss, read_imu
+from importers.text.log import TextLog
+from importers.text.nmea import is_nmea, read_nmea
+from importers.text.rtklib_pos import is_pos, read_pos
+from importers.text.smartphone import is_smartphone, read_smartphone
+from importers.text.tum import is_tum, read_tum
+from importers.ublox.stream import UbxLog, is_ubx
+from navreplay.geodesy.time_scales import LEAP_SECONDS
 from navreplay.timeline import LogError
 
 __all__ = ["FORMATS", "Format", "open_log"]
@@ -79,7 +79,7 @@ def _text(head: bytes) -> str:
 def _open_mcap(path: str, head: bytes, settings: InputSettings) -> Log | None:
     if not head.startswith(b"\x89MCAP"):
         return None
-    from importers.mcap_log import McapLog
+    from importers.containers.mcap import McapLog
 
     return McapLog(path)
 
@@ -87,7 +87,7 @@ def _open_mcap(path: str, head: bytes, settings: InputSettings) -> Log | None:
 def _open_ros1(path: str, head: bytes, settings: InputSettings) -> Log | None:
     if not head.startswith(b"#ROSBAG"):
         return None
-    from importers.ros1_bag import Ros1Bag
+    from importers.containers.ros1_bag import Ros1Bag
 
     return Ros1Bag(path)
 
@@ -98,7 +98,7 @@ def _open_ros2(path: str, head: bytes, settings: InputSettings) -> Log | None:
         raise LogError(f"{path}: the folder holds no ROS 2 bag (no metadata.yaml, no .db3); name the log file itself")
     if not folder and not head.startswith(b"SQLite format 3\x00"):
         return None
-    from importers.ros2_bag import Ros2Bag
+    from importers.containers.ros2_bag import Ros2Bag
 
     return Ros2Bag(path)
 

@@ -6,18 +6,18 @@ from pathlib import Path
 
 import numpy as np
 
-from importers.clock import leap_seconds
+from importers.conversion.ranges import flat_source
 from importers.findings import Finding
 from importers.formats import open_log
 from importers.load import build_timeline, describe_file, open_logs
-from importers.log import Channel, Log, Table
-from importers.messages import find_kind, stamp_column
-from importers.preflight import preflight
-from importers.range_conversion import flat_source
-from importers.selection import SETTING, Choice, always_used, candidates, choose_role
+from importers.preflight.checks import preflight
+from importers.roles.messages import find_kind, stamp_column
+from importers.roles.selection import SETTING, Choice, always_used, candidates, choose_role
+from importers.roles.sources import Clock, Source, join_sources
+from importers.rows.clock import leap_seconds
+from importers.rows.log import Channel, Log, Table
 from importers.settings import AttitudeInput, FixInput, ImuInput, InputSettings, ReferenceInput
-from importers.sources import Clock, Source, join_sources
-from navreplay.time_scales import LeapSeconds, gps_from_utc
+from navreplay.geodesy.time_scales import LeapSeconds, gps_from_utc
 from navreplay.timeline import LogError, SourceFile, Times
 
 __all__ = ["ChannelInfo", "Inspection", "inspect_logs"]

@@ -6,17 +6,17 @@ from pathlib import Path
 
 import numpy as np
 
-from importers.attitude_conversion import convert_attitude
-from importers.clock import leap_seconds
-from importers.fix_conversion import convert_fixes
+from importers.conversion.attitudes import convert_attitude
+from importers.conversion.fixes import convert_fixes
+from importers.conversion.imu import convert_imu
+from importers.conversion.ranges import convert_ranges
+from importers.conversion.reference import convert_reference, reference_from_fixes
 from importers.formats import open_log
-from importers.imu_conversion import convert_imu
-from importers.log import Log, Table
-from importers.range_conversion import convert_ranges
-from importers.reference_conversion import convert_reference, reference_from_fixes
-from importers.selection import Choice, choose_channels
+from importers.roles.selection import Choice, choose_channels
+from importers.roles.sources import Clock, Source, join_sources
+from importers.rows.clock import leap_seconds
+from importers.rows.log import Log, Table
 from importers.settings import InputSettings
-from importers.sources import Clock, Source, join_sources
 from navreplay.timeline import ChannelUse, LogError, Provenance, RangeSeries, SourceFile, Timeline
 
 __all__ = ["build_timeline", "describe_file", "load_timeline", "open_logs"]
@@ -33,8 +33,8 @@ def load_timeline(
 ) -> Timeline:
     """Reads logs, and a reference beside them, into one timeline; progress is called with the fraction done.
 
-    A series no channel serves is None: `importers.preflight` tells what that means. Raises LogError where a file cannot be
-    read, a channel is missing or ambiguous, or a chosen channel holds nothing usable.
+    A series no channel serves is None: `importers.preflight.checks` tells what that means. Raises LogError where a file cannot
+    be read, a channel is missing or ambiguous, or a chosen channel holds nothing usable.
     """
     settings = settings or InputSettings()
     logs = open_logs(paths, settings)

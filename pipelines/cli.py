@@ -9,7 +9,7 @@ from pathlib import Path
 
 __all__ = ["EXPORT_FORMATS", "main"]
 
-# As pipelines.export has them; not imported from there, so that --help stays quick.
+# As pipelines.trajectory.export has them; not imported from there, so that --help stays quick.
 EXPORT_FORMATS = ("csv", "parquet", "tum", "kitti", "kml", "geojson", "pos", "sbet")
 
 

@@ -4,8 +4,12 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from navreplay.timeline import LogError
-from pipelines.compare import Outcome, Variant
-from pipelines.comparison import (
+from pipelines.config.spec import dump_toml, filter_options
+from pipelines.drive.compare import Outcome, Variant
+from pipelines.drive.estimated import estimated_toml
+from pipelines.drive.result import RunResult
+from pipelines.files.whole_file import write_whole
+from pipelines.report.comparison import (
     MOST_DRAWN,
     Comparison,
     build_comparison,
@@ -13,17 +17,13 @@ from pipelines.comparison import (
     comparison_plots,
     comparison_tables,
 )
-from pipelines.estimated import estimated_toml
-from pipelines.launch_csv import write_launch_csv
-from pipelines.report import Report, build_report, dump_json
-from pipelines.report_figures import report_plots
-from pipelines.report_html import render_html
-from pipelines.report_markdown import render_markdown
-from pipelines.report_tables import headline_figures, report_tables
-from pipelines.result import RunResult
-from pipelines.solution_csv import utc_text, write_solution_csv
-from pipelines.spec import dump_toml, filter_options
-from pipelines.whole_file import write_whole
+from pipelines.report.content import Report, build_report, dump_json
+from pipelines.report.figures import report_plots
+from pipelines.report.html import render_html
+from pipelines.report.markdown import render_markdown
+from pipelines.report.tables import headline_figures, report_tables
+from pipelines.trajectory.launch_csv import write_launch_csv
+from pipelines.trajectory.solution_csv import utc_text, write_solution_csv
 
 __all__ = ["write_comparison", "write_each", "write_outputs"]
 
@@ -54,7 +54,7 @@ def write_outputs(result: RunResult, out_dir: Path) -> dict[str, Path]:
         estimated = estimated_toml(result.config, result.solution)
         writers["config.estimated.toml"] = lambda path: path.write_text(estimated, encoding="utf-8")
     if result.config.output.recording:
-        from pipelines.rerun_view import write_recording  # loading rerun takes a second, and not every run records
+        from pipelines.recording.view import write_recording  # loading rerun takes a second, and not every run records
 
         writers["recording.rrd"] = lambda path: write_recording(path, result)
     return _write_files(out_dir, writers)

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from pipelines.process import Progress
+from pipelines.drive.process import Progress
 
 __all__ = ["show_progress"]
 

@@ -4,12 +4,12 @@ from dataclasses import replace
 from math import pi
 
 from navreplay.options import ImuNoise
-from synthetic_logs.imu_errors import ImuErrors
-from synthetic_logs.motion import Motion, accelerate, climb, stop, straight, turn
-from synthetic_logs.receiver import Receiver
-from synthetic_logs.receiver_clock import ReceiverClock
+from synthetic_logs.motion.manoeuvres import Motion, accelerate, climb, stop, straight, turn
+from synthetic_logs.ranges.receiver import Receiver
+from synthetic_logs.ranges.receiver_clock import ReceiverClock
+from synthetic_logs.ranges.surroundings import Surroundings
+from synthetic_logs.sensors.imu_errors import ImuErrors
 from synthetic_logs.simulation import Journey, Scenario
-from synthetic_logs.surroundings import Surroundings
 
 __all__ = ["RANGE_SCENARIOS"]
 

@@ -5,13 +5,13 @@ from math import pi, sqrt
 
 from navreplay.options import ImuNoise
 from navreplay.timeline import FixStatus
-from synthetic_logs.ballistic import BallisticFlight
-from synthetic_logs.gnss import GnssErrors
-from synthetic_logs.imu_errors import ImuErrors
-from synthetic_logs.motion import Leg, Motion, accelerate, climb, course_rate_of_bank, spiral, stop, straight, turn
+from synthetic_logs.motion.ballistic import BallisticFlight
+from synthetic_logs.motion.manoeuvres import Leg, Motion, accelerate, climb, course_rate_of_bank, spiral, stop, straight, turn
 from synthetic_logs.range_scenarios import RANGE_SCENARIOS
+from synthetic_logs.sensors.gnss import GnssErrors
+from synthetic_logs.sensors.imu_errors import ImuErrors
+from synthetic_logs.sensors.star_sensor import StarSensor
 from synthetic_logs.simulation import Journey, Scenario
-from synthetic_logs.star_sensor import StarSensor
 
 __all__ = ["SCENARIOS"]
 

@@ -5,8 +5,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from navreplay.atmosphere import SPEED_OF_LIGHT
-from navreplay.rotation import euler_from_quat
+from navreplay.geodesy.rotation import euler_from_quat
+from navreplay.measurements.atmosphere import SPEED_OF_LIGHT
 from navreplay.timeline import (
     AttitudeSeries,
     Floats,
@@ -18,15 +18,15 @@ from navreplay.timeline import (
     Times,
     Trajectory,
 )
-from synthetic_logs.constellation import Orbits, arrange_constellation
-from synthetic_logs.gnss import AntennaPath, FixErrors, GnssErrors, antenna_path, measure_fixes
-from synthetic_logs.imu import sense, sense_means
-from synthetic_logs.imu_errors import ImuErrors, SensorErrors, disturb_imu
-from synthetic_logs.kinematics import Path, Traceable
-from synthetic_logs.ranges import Epochs, RangeTruth, measure_ranges
-from synthetic_logs.receiver import Receiver
-from synthetic_logs.receiver_clock import draw_clock
-from synthetic_logs.star_sensor import AttitudeErrors, StarSensor, measure_attitudes
+from synthetic_logs.motion.kinematics import Path, Traceable
+from synthetic_logs.ranges.constellation import Orbits, arrange_constellation
+from synthetic_logs.ranges.receiver import Receiver
+from synthetic_logs.ranges.receiver_clock import draw_clock
+from synthetic_logs.ranges.simulated import Epochs, RangeTruth, measure_ranges
+from synthetic_logs.sensors.gnss import AntennaPath, FixErrors, GnssErrors, antenna_path, measure_fixes
+from synthetic_logs.sensors.imu import sense, sense_means
+from synthetic_logs.sensors.imu_errors import ImuErrors, SensorErrors, disturb_imu
+from synthetic_logs.sensors.star_sensor import AttitudeErrors, StarSensor, measure_attitudes
 
 __all__ = ["Journey", "Scenario", "SyntheticLog", "ideal_imu", "orbits_of", "simulate", "truth_at", "with_duration"]
 

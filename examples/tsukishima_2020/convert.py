@@ -19,8 +19,8 @@ from rosbags.typesys import Stores, get_typestore
 
 from importers import load_timeline
 from importers.settings import InputSettings
-from navreplay.earth import lla_from_ecef
-from navreplay.time_scales import gps_from_week_tow, utc_from_gps
+from navreplay.geodesy.earth import lla_from_ecef
+from navreplay.geodesy.time_scales import gps_from_week_tow, utc_from_gps
 from synthetic_logs.writers.range_messages import SCHEMA, SCHEMA_NAME, TOPIC, range_messages
 
 HERE = Path(__file__).parent

@@ -7,8 +7,8 @@ When well specified: mean NEES per state 0.9 to 1.1, NIS per component 0.95 to 1
 
 from dataclasses import dataclass
 
-from navreplay.adapt.adapter import Adaptation
-from navreplay.filters.core import Gaussian, Innovation
+from navreplay.update.adapter import Adaptation
+from navreplay.update.gaussian import Gaussian, Innovation
 
 __all__ = ["Fixed"]
 

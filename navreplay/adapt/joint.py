@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from navreplay.filters.core import Gaussian, Innovation, solve, symmetric
 from navreplay.timeline import Floats
+from navreplay.update.gaussian import Gaussian, Innovation, solve, symmetric
 
 __all__ = ["inflate", "posterior_square"]
 

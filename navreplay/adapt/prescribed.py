@@ -9,10 +9,10 @@ When well specified (all ratios 1): mean NEES per state 0.9 to 1.1, NIS per comp
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from navreplay.adapt.adapter import Adaptation
 from navreplay.adapt.ratio import scale_noise
-from navreplay.filters.core import Gaussian, Innovation
 from navreplay.timeline import Floats
+from navreplay.update.adapter import Adaptation
+from navreplay.update.gaussian import Gaussian, Innovation
 
 __all__ = ["Prescribed"]
 

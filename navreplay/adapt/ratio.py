@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from navreplay.filters.core import Innovation
 from navreplay.timeline import Floats
+from navreplay.update.gaussian import Innovation
 
 __all__ = ["excess_ratio", "scale_noise"]
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from navreplay.error_models.error_model import MotionModel
 from navreplay.error_models.ned import Propagated
-from navreplay.strapdown import Leg, NavState
+from navreplay.mechanisation.strapdown import Leg, NavState
 from navreplay.timeline import Floats
 
 __all__ = ["ClockedModel", "ReceiverModel"]

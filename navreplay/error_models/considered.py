@@ -12,10 +12,10 @@ import numpy as np
 
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.error_models.ned import POSITION, VELOCITY, Propagated
-from navreplay.measurements import Measurement
+from navreplay.mechanisation.strapdown import Leg, NavState
 from navreplay.options import ConsiderOptions
-from navreplay.strapdown import Leg, NavState
 from navreplay.timeline import Floats
+from navreplay.update.measurement import Measurement
 
 __all__ = ["ConsideredModel"]
 

@@ -3,7 +3,7 @@
 from typing import Protocol
 
 from navreplay.error_models.ned import Propagated
-from navreplay.strapdown import Leg, NavState
+from navreplay.mechanisation.strapdown import Leg, NavState
 from navreplay.timeline import Floats
 
 __all__ = ["ErrorModel", "MotionModel"]

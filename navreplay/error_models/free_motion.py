@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from navreplay import earth, rotation
 from navreplay.error_models.ned import ATTITUDE, POSITION, VELOCITY, Propagated
+from navreplay.geodesy import earth, rotation
+from navreplay.mechanisation.strapdown import Leg, NavState
 from navreplay.options import MotionOptions
-from navreplay.strapdown import Leg, NavState
 from navreplay.timeline import Floats
 
 __all__ = ["FreeMotionModel"]

@@ -1,7 +1,7 @@
 """The 15-state error model and the mechanisation of the launch-inertial frame: Si, Wang and Niu (SINS/CNS), (19)-(24).
 
-Motion and errors move in the launch-inertial frame (`navreplay._launch_kernel`); at each node they are told as the rest of the
-program knows them, in NED on the Earth. With D the turn of NED with position and w_ie the Earth's rotation,
+Motion and errors move in the launch-inertial frame (`navreplay.mechanisation._launch_kernel`); at each node they are told as
+the rest of the program knows them, in NED on the Earth. With D the turn of NED with position and w_ie the Earth's rotation,
     dX = C_ln dp, dV = C_ln (dv - [v x] D dp + [w_ie x] dp), phi_l = C_ln (phi_n + D dp),
 so that the filter is that of the paper to first order, whatever it measures.
 """
@@ -10,12 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from navreplay import _launch_kernel, earth
 from navreplay.error_models.ned import ATTITUDE, POSITION, VELOCITY, NedErrorModel, Propagated
-from navreplay.launch_frame import LaunchFrame, LaunchState
+from navreplay.geodesy import earth
+from navreplay.geodesy.launch_frame import LaunchFrame, LaunchState
+from navreplay.geodesy.rotation import skew
+from navreplay.mechanisation import _launch_kernel
+from navreplay.mechanisation.strapdown import Leg, NavState
 from navreplay.options import FilterOptions
-from navreplay.rotation import skew
-from navreplay.strapdown import Leg, NavState
 from navreplay.timeline import Floats, LogError
 
 __all__ = ["LaunchInertialModel", "exchange_errors", "inertial_model"]

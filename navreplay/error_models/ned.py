@@ -1,7 +1,7 @@
 """Error state in NED: 15 elements, with scale factors 6 more, with a Gauss-Markov gyro error 3 more.
 
-Layout, noise, initial covariance, retraction and propagation. The equations themselves are in `navreplay._ned_kernel`, which
-also states the sign of each element.
+Layout, noise, initial covariance, retraction and propagation. The equations themselves are in
+`navreplay.mechanisation._ned_kernel`, which also states the sign of each element.
 """
 
 from dataclasses import dataclass
@@ -9,9 +9,10 @@ from functools import cache
 
 import numpy as np
 
-from navreplay import _ned_kernel, earth, rotation
+from navreplay.geodesy import earth, rotation
+from navreplay.mechanisation import _ned_kernel
+from navreplay.mechanisation.strapdown import Leg, NavState
 from navreplay.options import ImuNoise
-from navreplay.strapdown import Leg, NavState
 from navreplay.timeline import Floats
 
 __all__ = ["ACCEL_BIAS", "ATTITUDE", "GYRO_BIAS", "POSITION", "VELOCITY", "NedErrorModel", "Propagated", "gyro_columns"]

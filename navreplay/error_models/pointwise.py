@@ -17,9 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from navreplay import _cubature_kernel
 from navreplay.error_models.ned import NedErrorModel, Propagated
-from navreplay.strapdown import Leg, NavState
+from navreplay.mechanisation import _cubature_kernel
+from navreplay.mechanisation.strapdown import Leg, NavState
 from navreplay.timeline import Floats
 
 __all__ = ["PointwiseModel"]

@@ -14,20 +14,22 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from navreplay import _bank_kernel
-from navreplay.adapt.adapter import adapt_measured, is_measured
 from navreplay.adapt.fixed import Fixed
+from navreplay.aiding.epochs import Aiding
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.error_models.ned import Propagated
-from navreplay.filters.core import Gaussian, Leftover, symmetric
+from navreplay.filters import _bank_kernel
 from navreplay.filters.presets import Method
-from navreplay.filters.record import Recorder
-from navreplay.filters.update import Aiding, EpochGate, Updated, tell_inflation
+from navreplay.filters.update import Updated, tell_inflation
 from navreplay.filters.weights import Mmae
-from navreplay.measurements import Measurement
+from navreplay.mechanisation.strapdown import Leg, NavState
 from navreplay.solution import RowStatus
-from navreplay.strapdown import Leg, NavState
 from navreplay.timeline import Floats, LogError
+from navreplay.update.adapter import adapt_measured, is_measured
+from navreplay.update.gaussian import Gaussian, Leftover, symmetric
+from navreplay.update.measurement import Measurement
+from navreplay.update.record import Recorder
+from navreplay.update.verdict import EpochGate
 
 __all__ = ["Bank", "Stack", "Update", "mix", "move_stack", "update_stack"]
 

@@ -15,21 +15,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from navreplay.adapt.adapter import is_measured
-from navreplay.adapt.partial_tracking import PartialTracking
+from navreplay.adapt.inflation.partial_tracking import PartialTracking
+from navreplay.aiding.epochs import Aiding, Observed
 from navreplay.error_models.considered import ConsideredModel
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.error_models.ned import Propagated
 from navreplay.filters.bank import Bank
-from navreplay.filters.core import Gaussian, Innovation, condition, kalman_gain
 from navreplay.filters.moments import Linearised, MomentRule
 from navreplay.filters.presets import Method
-from navreplay.filters.record import Recorder
-from navreplay.filters.update import Aiding, EpochGate, Estimator, Observed, Updater
-from navreplay.measurements import Measurement
+from navreplay.filters.update import Estimator, Updater
+from navreplay.mechanisation.strapdown import Leg, NavState
 from navreplay.options import FilterOptions
-from navreplay.strapdown import Leg, NavState
 from navreplay.timeline import Floats, LogError, Times
+from navreplay.update.adapter import is_measured
+from navreplay.update.gaussian import Gaussian, Innovation, condition, kalman_gain
+from navreplay.update.measurement import Measurement
+from navreplay.update.record import Recorder
+from navreplay.update.verdict import EpochGate
 
 __all__ = ["ConsideredAiding", "PartialTracker", "Schmidt", "Setup", "check_considers", "set_up"]
 

@@ -20,7 +20,7 @@ from navreplay.error_models.launch_inertial import LaunchInertialModel
 from navreplay.error_models.ned import NedErrorModel, Propagated
 from navreplay.error_models.pointwise import PointwiseModel
 from navreplay.filters.moments import Linearised
-from navreplay.strapdown import Leg, NavState
+from navreplay.mechanisation.strapdown import Leg, NavState
 from navreplay.timeline import Floats, LogError
 
 __all__ = ["Cubature"]

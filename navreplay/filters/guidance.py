@@ -2,25 +2,26 @@
 
 from dataclasses import dataclass
 
-from navreplay.alignment import align
+from navreplay.aiding.attitudes import AttitudeAiding
+from navreplay.aiding.epochs import Aiding
+from navreplay.aiding.fixes import FixAiding
+from navreplay.aiding.joint import JointAiding, JointGate
+from navreplay.aiding.ranges import RangeAiding
+from navreplay.aiding.standstill import StandstillAiding, standstill_candidates
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.error_models.launch_inertial import inertial_model
 from navreplay.error_models.ned import NedErrorModel
-from navreplay.filters.attitude_aiding import AttitudeAiding
-from navreplay.filters.fix_aiding import FixAiding
-from navreplay.filters.gate import Gate
-from navreplay.filters.joint_aiding import JointAiding, JointGate
-from navreplay.filters.range_aiding import RangeAiding
-from navreplay.filters.range_gate import RangeGate
-from navreplay.filters.record import Recorder
-from navreplay.filters.standstill_aiding import StandstillAiding, standstill_candidates
-from navreplay.filters.update import Aiding, EpochGate
-from navreplay.heading import Sources
+from navreplay.measurements.standstill import find_standstills
+from navreplay.mechanisation.strapdown import NavState
 from navreplay.options import FilterOptions, GateOptions, VehicleOptions
-from navreplay.standstill import find_standstills
-from navreplay.strapdown import NavState
+from navreplay.start.alignment import align
+from navreplay.start.heading import Sources
+from navreplay.start.told import start_as_told
 from navreplay.timeline import Floats, ImuSeries, LogError, Timeline
-from navreplay.told_start import start_as_told
+from navreplay.update.gate import Gate
+from navreplay.update.range_gate import RangeGate
+from navreplay.update.record import Recorder
+from navreplay.update.verdict import EpochGate
 
 __all__ = ["Guidance", "choose_guidance"]
 

@@ -5,10 +5,10 @@ from typing import Protocol
 
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.error_models.ned import Propagated
-from navreplay.filters.core import Gaussian, Innovation, condition
-from navreplay.measurements import Measurement
-from navreplay.strapdown import Leg, NavState
+from navreplay.mechanisation.strapdown import Leg, NavState
 from navreplay.timeline import Floats
+from navreplay.update.gaussian import Gaussian, Innovation, condition
+from navreplay.update.measurement import Measurement
 
 __all__ = ["Linearised", "MomentRule"]
 

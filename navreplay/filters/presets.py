@@ -5,32 +5,32 @@ from dataclasses import dataclass, fields
 from difflib import get_close_matches
 from typing import Any
 
-from navreplay.adapt.adapter import NoiseAdapter
-from navreplay.adapt.auto import Auto
-from navreplay.adapt.correntropy import Correntropy
-from navreplay.adapt.eiakf import Eiakf
-from navreplay.adapt.em import Em, PrintedEm
-from navreplay.adapt.em_offline import EmOffline
-from navreplay.adapt.ermakf import Ermakf
-from navreplay.adapt.ermakf_derived import ErmakfDerived
-from navreplay.adapt.ermakf_whitened import ErmakfWhitened
 from navreplay.adapt.fixed import Fixed
-from navreplay.adapt.h_infinity import HInfinity
-from navreplay.adapt.huber import Huber
-from navreplay.adapt.iae import Iae
-from navreplay.adapt.iae_q import IaeQ
-from navreplay.adapt.maximum_likelihood import GeneticLikelihood, MaximumLikelihood
-from navreplay.adapt.partial_tracking import PartialTracking
-from navreplay.adapt.sage_husa import SageHusa
-from navreplay.adapt.srmakf import Srmakf
-from navreplay.adapt.strong_tracking import StrongTracking
-from navreplay.adapt.student_t import StudentT
-from navreplay.adapt.variational_bayes import VariationalBayes
-from navreplay.filters.calibration import Calibration
+from navreplay.adapt.inflation.h_infinity import HInfinity
+from navreplay.adapt.inflation.partial_tracking import PartialTracking
+from navreplay.adapt.inflation.strong_tracking import StrongTracking
+from navreplay.adapt.likelihood.em import Em, PrintedEm
+from navreplay.adapt.likelihood.maximum_likelihood import GeneticLikelihood, MaximumLikelihood
+from navreplay.adapt.likelihood.variational_bayes import VariationalBayes
+from navreplay.adapt.redundant.eiakf import Eiakf
+from navreplay.adapt.redundant.ermakf import Ermakf
+from navreplay.adapt.redundant.ermakf_derived import ErmakfDerived
+from navreplay.adapt.redundant.ermakf_whitened import ErmakfWhitened
+from navreplay.adapt.redundant.srmakf import Srmakf
+from navreplay.adapt.robust.correntropy import Correntropy
+from navreplay.adapt.robust.huber import Huber
+from navreplay.adapt.robust.student_t import StudentT
+from navreplay.adapt.windowed.iae import Iae
+from navreplay.adapt.windowed.iae_q import IaeQ
+from navreplay.adapt.windowed.sage_husa import SageHusa
+from navreplay.calibration.auto import Auto
+from navreplay.calibration.em_offline import EmOffline
+from navreplay.calibration.settled import Calibration
 from navreplay.filters.cubature import Cubature
 from navreplay.filters.moments import Linearised, MomentRule
 from navreplay.filters.weights import Immae, Mmae, MmaeFloor
 from navreplay.timeline import LogError
+from navreplay.update.adapter import NoiseAdapter
 
 __all__ = ["PRESETS", "BankPreset", "Method", "Preset", "build_method"]
 

@@ -8,8 +8,8 @@ from navreplay.error_models.error_model import ErrorModel
 from navreplay.error_models.ned import Propagated
 from navreplay.filters.smoother import ForwardPass, smooth
 from navreplay.filters.update import Updated
+from navreplay.mechanisation.strapdown import NavState
 from navreplay.solution import RowStatus
-from navreplay.strapdown import NavState
 from navreplay.timeline import Floats, Times
 
 __all__ = ["Rows"]

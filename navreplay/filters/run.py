@@ -6,24 +6,24 @@ from typing import Any
 
 import numpy as np
 
-from navreplay.adapt.adapter import NoiseAdapter
+from navreplay.aiding.ranges import RangeAiding
+from navreplay.calibration.linear_log import LinearLog
+from navreplay.calibration.settled import settle_nothing
 from navreplay.error_models.error_model import ErrorModel
-from navreplay.filters.calibration import settle_nothing
 from navreplay.filters.consider import Setup, check_considers, set_up
 from navreplay.filters.guidance import Guidance, choose_guidance
-from navreplay.filters.linear_log import LinearLog
 from navreplay.filters.presets import Method
-from navreplay.filters.range_aiding import RangeAiding
-from navreplay.filters.range_gate import RangeGate
-from navreplay.filters.record import Recorder
 from navreplay.filters.rows import Rows
 from navreplay.filters.stretches import cut_at_gaps, tell_unreached
 from navreplay.filters.trace import Traces
 from navreplay.filters.update import Estimator
+from navreplay.mechanisation.strapdown import Leg, NavState, Steps, idle_steps, make_steps
 from navreplay.options import FilterOptions
 from navreplay.solution import Event, Solution
-from navreplay.strapdown import Leg, NavState, Steps, idle_steps, make_steps
 from navreplay.timeline import Floats, ImuSeries, LogError, Timeline, Times
+from navreplay.update.adapter import NoiseAdapter
+from navreplay.update.range_gate import RangeGate
+from navreplay.update.record import Recorder
 
 __all__ = ["run_filter"]
 

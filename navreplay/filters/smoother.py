@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from navreplay.error_models.error_model import ErrorModel
-from navreplay.filters.core import symmetric
-from navreplay.strapdown import NavState
+from navreplay.mechanisation.strapdown import NavState
 from navreplay.timeline import Floats
+from navreplay.update.gaussian import symmetric
 
 __all__ = ["ForwardPass", "smooth"]
 

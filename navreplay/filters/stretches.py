@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from navreplay.filters.record import Recorder
+from navreplay.mechanisation.strapdown import find_gaps, split_at_long_gaps
 from navreplay.options import GapOptions
-from navreplay.strapdown import find_gaps, split_at_long_gaps
 from navreplay.timeline import ImuSeries, LogError, Times
+from navreplay.update.record import Recorder
 
 __all__ = ["cut_at_gaps", "tell_unreached"]
 

@@ -4,14 +4,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from navreplay.calibration.linear_log import LinearLog
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.error_models.ned import Propagated
 from navreplay.error_models.noise_sources import without_sources
-from navreplay.filters.linear_log import LinearLog
 from navreplay.filters.update import Estimator, Updated
-from navreplay.measurements import Measurement
-from navreplay.strapdown import Leg, NavState
+from navreplay.mechanisation.strapdown import Leg, NavState
 from navreplay.timeline import Floats, Times
+from navreplay.update.measurement import Measurement
 
 __all__ = ["Tracer", "Traces"]
 

@@ -4,26 +4,20 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from navreplay.adapt.adapter import adapt_measured
+from navreplay.aiding.epochs import Aiding, Observed
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.error_models.ned import Propagated
-from navreplay.filters.core import Gaussian, Innovation, Leftover
 from navreplay.filters.presets import Method
-from navreplay.filters.record import Recorder
-from navreplay.measurements import Measurement
+from navreplay.mechanisation.strapdown import Leg, NavState
 from navreplay.solution import RowStatus
-from navreplay.strapdown import Leg, NavState
-from navreplay.timeline import Floats, Times
+from navreplay.timeline import Floats
+from navreplay.update.adapter import adapt_measured
+from navreplay.update.gaussian import Gaussian, Leftover
+from navreplay.update.measurement import Measurement
+from navreplay.update.record import Recorder
+from navreplay.update.verdict import EpochGate, Verdict
 
-__all__ = ["Aiding", "EpochGate", "Estimator", "Observed", "Updated", "Updater", "Verdict", "tell_inflation"]
-
-
-class Observed(NamedTuple):
-    """measurement: None where the epoch holds none. state and cov (n, n): as given, or with a clock jump absorbed."""
-
-    measurement: Measurement | None
-    state: NavState
-    cov: Floats
+__all__ = ["Estimator", "Updated", "Updater", "tell_inflation"]
 
 
 class Updated(NamedTuple):
@@ -36,55 +30,6 @@ class Updated(NamedTuple):
     prior_cov: Floats
     status: RowStatus
     observed: Observed
-
-
-class Verdict(Protocol):
-    """What a gate says of an epoch."""
-
-    @property
-    def passed(self) -> np.ndarray:
-        """(k,) indices of the components to use."""
-        ...
-
-    @property
-    def inflation(self) -> float:
-        """Factor on the prior covariance, above 1 where the gate had to be reopened."""
-        ...
-
-    @property
-    def run(self) -> int:
-        """Rejected epochs in a row."""
-        ...
-
-    def record(self, recorder: Recorder, t_ns: int, kinds: tuple[str, ...], innovation: Innovation, noise: Floats) -> None:
-        """Puts the components into the record with the verdict on them."""
-        ...
-
-
-class EpochGate(Protocol):
-    """Judges the innovations of an epoch."""
-
-    def judge(self, kinds: tuple[str, ...], innovation: Innovation, noise: Floats) -> Verdict:
-        """The verdict on an innovation with R = noise (m, m) whose components are of the given kinds (m,)."""
-        ...
-
-
-class Aiding(Protocol):
-    """Measurements by epoch."""
-
-    @property
-    def name(self) -> str:
-        """What they are called in messages, in the plural."""
-        ...
-
-    @property
-    def t_ns(self) -> Times:
-        """(e,) times of the epochs."""
-        ...
-
-    def observe(self, epoch: int, state: NavState, cov: Floats, dtheta: Floats, dt: float) -> Observed:
-        """The measurement with index epoch; dtheta (3,) [rad] and dt [s] are those of the step before it."""
-        ...
 
 
 class Estimator(Protocol):

@@ -4,12 +4,12 @@ import argparse
 import json
 
 from pipelines.commands.options import read_settings
-from pipelines.compare import compare, name_methods, plan_variants
-from pipelines.comparison_summary import comparison_values, summarise_comparison
-from pipelines.destination import check_folder
+from pipelines.drive.compare import compare, name_methods, plan_variants
+from pipelines.files.destination import check_folder
 from pipelines.outputs import write_comparison, write_each
 from pipelines.progress import show_progress
-from pipelines.summary import describe_outputs
+from pipelines.report.comparison_summary import comparison_values, summarise_comparison
+from pipelines.report.summary import describe_outputs
 
 __all__ = ["run"]
 

@@ -5,12 +5,12 @@ import difflib
 import os
 
 from navreplay.timeline import LogError
-from pipelines.destination import check_folder
-from pipelines.experiment import run_experiment
-from pipelines.experiment_report import write_experiment
 from pipelines.experiments import EXPERIMENTS
+from pipelines.files.destination import check_folder
+from pipelines.monte_carlo.experiment import run_experiment
+from pipelines.monte_carlo.report import write_experiment
 from pipelines.progress import show_progress
-from pipelines.summary import describe_outputs
+from pipelines.report.summary import describe_outputs
 
 __all__ = ["run"]
 

@@ -2,8 +2,8 @@
 
 import argparse
 
-from pipelines.destination import check_file
-from pipelines.export import export
+from pipelines.files.destination import check_file
+from pipelines.trajectory.export import export
 
 __all__ = ["run"]
 

@@ -3,12 +3,12 @@
 import argparse
 
 from importers.inspection import Inspection, inspect_logs
-from importers.selection import SETTING
+from importers.roles.selection import SETTING
 from navreplay.timeline import LogError
 from pipelines.commands.options import read_config
-from pipelines.destination import check_file
-from pipelines.spec import load_config
-from pipelines.template import commented_template
+from pipelines.config.spec import load_config
+from pipelines.config.template import commented_template
+from pipelines.files.destination import check_file
 
 __all__ = ["run"]
 

@@ -5,7 +5,7 @@ import json
 
 from importers.inspection import inspect_logs
 from pipelines.commands.options import read_config
-from pipelines.inspection_text import describe_inspection, inspection_values
+from pipelines.report.inspection import describe_inspection, inspection_values
 
 __all__ = ["run"]
 

@@ -6,8 +6,8 @@ import tomllib
 from collections.abc import Sequence
 
 from navreplay.timeline import LogError
-from pipelines.compare import Setting
-from pipelines.spec import Config, load_config
+from pipelines.config.spec import Config, load_config
+from pipelines.drive.compare import Setting
 
 __all__ = ["read_config", "read_settings"]
 

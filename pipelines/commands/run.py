@@ -4,11 +4,11 @@ import argparse
 import json
 
 from pipelines.commands.options import read_config
-from pipelines.destination import check_folder
+from pipelines.drive.process import process
+from pipelines.files.destination import check_folder
 from pipelines.outputs import write_outputs
-from pipelines.process import process
 from pipelines.progress import show_progress
-from pipelines.summary import describe_outputs, headline_figures, summarise_run
+from pipelines.report.summary import describe_outputs, headline_figures, summarise_run
 
 __all__ = ["run"]
 

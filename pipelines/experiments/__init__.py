@@ -1,6 +1,5 @@
 """The experiments by name, one file each."""
 
-from pipelines.experiment import Experiment
 from pipelines.experiments.auto_noise import AUTO_EXPERIMENTS
 from pipelines.experiments.emkf_spiral import EMKF_SPIRAL
 from pipelines.experiments.ermakf_city import ERMAKF_CITY
@@ -9,6 +8,7 @@ from pipelines.experiments.mlckf_inaccurate_r import MLCKF_INACCURATE_R
 from pipelines.experiments.mlckf_mixture import MLCKF_MIXTURE
 from pipelines.experiments.psteckf_uav import PSTECKF_UAV
 from pipelines.experiments.redundant_noise import REDUNDANT_NOISE
+from pipelines.monte_carlo.experiment import Experiment
 
 __all__ = ["EXPERIMENTS"]
 

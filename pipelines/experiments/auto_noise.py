@@ -4,8 +4,8 @@ from dataclasses import replace
 from math import radians
 
 from navreplay.options import AlignmentOptions, FilterOptions, GateOptions
-from pipelines.experiment import Arm, ConsistencyClaim, Experiment, RatioClaim, Stretch
-from pipelines.perturbed import Perturbation
+from pipelines.monte_carlo.experiment import Arm, ConsistencyClaim, Experiment, RatioClaim, Stretch
+from pipelines.monte_carlo.perturbed import Perturbation
 from synthetic_logs.scenarios import SCENARIOS
 
 __all__ = ["AUTO_EXPERIMENTS"]

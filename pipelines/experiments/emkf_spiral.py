@@ -4,9 +4,9 @@ from dataclasses import replace
 from math import radians
 
 from navreplay.options import AlignmentOptions, FilterOptions, GateOptions, ImuNoise
-from pipelines.experiment import Arm, Experiment, OrderClaim, Stretch
-from synthetic_logs.imu_errors import ImuErrors
+from pipelines.monte_carlo.experiment import Arm, Experiment, OrderClaim, Stretch
 from synthetic_logs.scenarios import SCENARIOS
+from synthetic_logs.sensors.imu_errors import ImuErrors
 
 __all__ = ["EMKF_SPIRAL"]
 

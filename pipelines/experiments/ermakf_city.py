@@ -1,7 +1,7 @@
 """The field test of Ge et al. (2020), section 4, as a synthetic drive of the same sensors and stretches."""
 
-from pipelines.experiment import Arm, Experiment, NoiseClaim, OrderClaim, Published, Stretch
 from pipelines.experiments.ungated_ranges import NOTES, ungated_options
+from pipelines.monte_carlo.experiment import Arm, Experiment, NoiseClaim, OrderClaim, Published, Stretch
 from synthetic_logs.scenarios import SCENARIOS
 
 __all__ = ["ERMAKF_CITY"]

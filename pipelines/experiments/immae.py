@@ -3,7 +3,7 @@
 from math import pi
 
 from navreplay.options import AlignmentOptions, FilterOptions, GateOptions
-from pipelines.experiment import LAUNCH_ARCSEC, Arm, Experiment, OrderClaim, Published, Stretch
+from pipelines.monte_carlo.experiment import LAUNCH_ARCSEC, Arm, Experiment, OrderClaim, Published, Stretch
 from synthetic_logs.scenarios import SCENARIOS
 
 __all__ = ["IMMAE_1", "IMMAE_2"]

@@ -4,9 +4,9 @@ from dataclasses import replace
 from math import pi
 
 from navreplay.options import AlignmentOptions, FilterOptions, GateOptions, ImuNoise
-from pipelines.told_noise import StartErrors
-from synthetic_logs.imu_errors import ImuErrors
+from pipelines.monte_carlo.told_noise import StartErrors
 from synthetic_logs.scenarios import SCENARIOS
+from synthetic_logs.sensors.imu_errors import ImuErrors
 from synthetic_logs.simulation import Scenario
 
 __all__ = ["ARCMIN_DEG", "NOTES", "OPTIONS", "PAPER", "START", "fly"]

@@ -1,7 +1,7 @@
 """Gao et al. (2021), section 4.1: from 500 to 700 s filters are told 16 R, while the noise stays what it was."""
 
-from pipelines.experiment import Arm, Experiment, NoiseClaim, Published, PublishedNoise, Stretch
 from pipelines.experiments.mlckf_flight import ARCMIN_DEG, NOTES, OPTIONS, PAPER, START, fly
+from pipelines.monte_carlo.experiment import Arm, Experiment, NoiseClaim, Published, PublishedNoise, Stretch
 
 __all__ = ["MLCKF_INACCURATE_R"]
 

@@ -1,7 +1,7 @@
 """Gao et al. (2021), section 4.2: one fix in five has eight times the standard deviation."""
 
-from pipelines.experiment import Arm, Experiment, Published, Stretch
 from pipelines.experiments.mlckf_flight import ARCMIN_DEG, NOTES, OPTIONS, PAPER, START, fly
+from pipelines.monte_carlo.experiment import Arm, Experiment, Published, Stretch
 
 __all__ = ["MLCKF_MIXTURE"]
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 from math import radians
 
 from navreplay.options import AlignmentOptions, ConsiderOptions, FilterOptions, GateOptions
-from pipelines.experiment import Arm, Experiment, OrderClaim, Published, Stretch
-from pipelines.perturbed import Perturbation
-from pipelines.told_noise import StartErrors
+from pipelines.monte_carlo.experiment import Arm, Experiment, OrderClaim, Published, Stretch
+from pipelines.monte_carlo.perturbed import Perturbation
+from pipelines.monte_carlo.told_noise import StartErrors
 from synthetic_logs.scenarios import SCENARIOS
 
 __all__ = ["PSTECKF_UAV"]

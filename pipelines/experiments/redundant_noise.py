@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 
-from pipelines.experiment import Arm, Experiment, NoiseClaim, Stretch
 from pipelines.experiments.ungated_ranges import NOTES, ungated_options
+from pipelines.monte_carlo.experiment import Arm, Experiment, NoiseClaim, Stretch
+from synthetic_logs.ranges.surroundings import Surroundings
 from synthetic_logs.scenarios import SCENARIOS
-from synthetic_logs.surroundings import Surroundings
 
 __all__ = ["REDUNDANT_NOISE"]
 

@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator
 
-from synthetic_logs.constellation import Orbits, refer_to
-from synthetic_logs.signals import system_of
+from synthetic_logs.ranges.constellation import Orbits, refer_to
+from synthetic_logs.ranges.signals import system_of
 from synthetic_logs.simulation import Journey
 
 __all__ = ["AHEAD_S", "WEEKS_BEFORE", "issues"]

@@ -13,12 +13,12 @@ import numpy as np
 from rosbags.typesys import get_types_from_msg
 from rosbags.typesys.store import Typestore
 
-from navreplay.atmosphere import SPEED_OF_LIGHT
-from navreplay.time_scales import WEEK_S, utc_from_gps
+from navreplay.geodesy.time_scales import WEEK_S, utc_from_gps
+from navreplay.measurements.atmosphere import SPEED_OF_LIGHT
 from navreplay.timeline import RangeSeries
-from synthetic_logs.constellation import Orbits, ascending_node
-from synthetic_logs.ranges import RangeTruth
-from synthetic_logs.signals import carrier_of
+from synthetic_logs.ranges.constellation import Orbits, ascending_node
+from synthetic_logs.ranges.signals import carrier_of
+from synthetic_logs.ranges.simulated import RangeTruth
 from synthetic_logs.simulation import SyntheticLog, orbits_of
 from synthetic_logs.writers.broadcast import AHEAD_S, WEEKS_BEFORE, issues
 
@@ -39,7 +39,7 @@ _ELEMENTS = {
     **{name: name for name in ("cuc", "cus", "crc", "crs", "cic", "cis", "af0", "af1")},
     "tgd0": "group_delay",
 }
-"""Fields that hold an element of `synthetic_logs.constellation.Orbits` as it is."""
+"""Fields that hold an element of `synthetic_logs.ranges.constellation.Orbits` as it is."""
 _OBSERVED = ("freqs", "CN0", "LLI", "code", "psr", "psr_std", "cp", "cp_std", "dopp", "dopp_std", "status")
 _BYTES = ("LLI", "code", "status")
 DEFINITIONS = {

@@ -6,7 +6,7 @@ from itertools import pairwise
 from math import isnan
 from typing import Any
 
-from navreplay.time_scales import utc_from_gps
+from navreplay.geodesy.time_scales import utc_from_gps
 from navreplay.timeline import Floats, RangeSeries
 
 __all__ = ["SCHEMA", "SCHEMA_NAME", "TOPIC", "range_messages"]

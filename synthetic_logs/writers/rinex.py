@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from navreplay.atmosphere import SPEED_OF_LIGHT
-from navreplay.earth import ecef_from_lla
-from navreplay.time_scales import GPS_EPOCH_UNIX_S, WEEK_S, utc_from_gps
+from navreplay.geodesy.earth import ecef_from_lla
+from navreplay.geodesy.time_scales import GPS_EPOCH_UNIX_S, WEEK_S, utc_from_gps
+from navreplay.measurements.atmosphere import SPEED_OF_LIGHT
 from navreplay.timeline import Floats, LogError, RangeSeries
-from synthetic_logs.constellation import Orbits, ascending_node
-from synthetic_logs.ranges import RangeTruth
-from synthetic_logs.signals import SIGNALS, carrier_of
+from synthetic_logs.ranges.constellation import Orbits, ascending_node
+from synthetic_logs.ranges.signals import SIGNALS, carrier_of
+from synthetic_logs.ranges.simulated import RangeTruth
 from synthetic_logs.simulation import Journey, SyntheticLog, orbits_of
 from synthetic_logs.writers.broadcast import AHEAD_S, WEEKS_BEFORE, issues
 from synthetic_logs.writers.text import write_imu

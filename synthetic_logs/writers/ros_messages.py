@@ -17,8 +17,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from navreplay.rotation import enu_from_ned, flu_from_frd, frd_from_flu_body, scalar_last_from_first
-from navreplay.time_scales import utc_from_gps
+from navreplay.geodesy.rotation import enu_from_ned, flu_from_frd, frd_from_flu_body, scalar_last_from_first
+from navreplay.geodesy.time_scales import utc_from_gps
 from navreplay.timeline import AttitudeSeries, FixStatus, GnssFixSeries, ImuSeries, Times
 from synthetic_logs.simulation import SyntheticLog
 

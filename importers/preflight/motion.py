@@ -1,0 +1,76 @@
+"""Findings from the motion that IMU and GNSS both saw: time offset, leap seconds, unit and sign of the yaw rate, forward
+axis."""
+
+import numpy as np
+
+from importers.findings import Finding
+from importers.preflight.motion_match import YawMatch, match_forward, match_yaw
+from navreplay.timeline import GnssFixSeries, ImuSeries
+
+__all__ = ["check_motion"]
+
+_SURE = 0.6
+_TOLD_S = 0.15
+_STEPS_S = {18.0: "UTC and GPS time", 37.0: "UTC and TAI", 19.0: "GPS time and TAI"}
+_ASKEW = np.radians(25.0)
+
+
+def check_motion(imu: ImuSeries, fixes: GnssFixSeries) -> list[Finding]:
+    """Findings about an IMU and fixes that overlap in time."""
+    match = match_yaw(imu, fixes)
+    if match is None or abs(match.correlation) < _SURE:
+        seen = "too few turns" if match is None else f"yaw rate and course agree only to {abs(match.correlation):.2f}"
+        text = f"The time offset between IMU and GNSS cannot be estimated from this log ({seen})."
+        return [Finding("info", "time-offset", text, "")]
+    wrong = _check_yaw(match)
+    return [_check_offset(match), *(wrong or _check_forward(imu, fixes, match.offset_s))]
+
+
+def _check_offset(match: YawMatch) -> Finding:
+    step = next((step for step in _STEPS_S if abs(abs(match.offset_s) - step) < 0.5), None)
+    figure = f"{match.offset_s:+.2f} s (noise {match.std_s:.2f} s, correlation {abs(match.correlation):.2f})"
+    if step is not None:
+        text = f"IMU and GNSS are {figure} apart in time: one of them is stamped in another of {_STEPS_S[step]}."
+        hint = f"Set input.imu.time_base or input.fix.time_base, or else input.imu.time_offset_s = {match.offset_s:.2f}."
+        return Finding("error", "leap-seconds", text, hint)
+    if abs(match.offset_s) > max(_TOLD_S, 3 * match.std_s):
+        text = f"Turns show in the IMU at another time than in the GNSS course: add {figure} to the IMU's stamps."
+        hint = (
+            f"Set input.imu.time_offset_s = {match.offset_s:.2f} (on top of any you have set), and check it by the residuals."
+        )
+        return Finding("warning", "time-offset", text, hint)
+    return Finding("info", "time-offset", f"IMU and GNSS agree in time, to about 0.1 s: the estimated offset is {figure}.", "")
+
+
+def _check_yaw(match: YawMatch) -> list[Finding]:
+    if match.slope < 0:
+        text = "The yaw rate has the opposite sign of the course rate: axes mirrored, or gyros or gravity inverted."
+        return [Finding("error", "yaw-sign", text, "Set input.imu.axes; check the signs of the sensor's columns.")]
+    if match.slope < 0.05:
+        text = (
+            f"The course turns {match.slope:.3f} times as fast as the IMU says: its rates seem to be in deg/s, taken for rad/s."
+        )
+        return [Finding("error", "gyro-unit", text, "Set input.imu.gyro_unit = 'deg/s'.")]
+    if match.slope > 20:
+        text = (
+            f"The course turns {match.slope:.0f} times as fast as the IMU says: its rates seem to be in rad/s, taken for deg/s."
+        )
+        return [Finding("error", "gyro-unit", text, "Set input.imu.gyro_unit = 'rad/s'.")]
+    if not 0.8 < match.slope < 1.25:
+        text = (
+            f"The course turns {match.slope:.2f} times as fast as the IMU says: a scale error, or an axis that is not vertical."
+        )
+        return [Finding("warning", "yaw-scale", text, "Check input.imu.axes and input.imu.mounting_deg.")]
+    return []
+
+
+def _check_forward(imu: ImuSeries, fixes: GnssFixSeries, offset_s: float) -> list[Finding]:
+    match = match_forward(imu, fixes, offset_s)
+    if match is None or match.correlation < _SURE or abs(match.angle) < _ASKEW:
+        return []
+    angle = float(np.degrees(match.angle))
+    text = (
+        f"When the vehicle gains speed, the IMU feels it {abs(angle):.0f} degrees to the {'right' if angle > 0 else 'left'} "
+        "of its x axis: that axis does not point forward."
+    )
+    return [Finding("warning", "forward-axis", text, "Set input.imu.axes, or the yaw of input.imu.mounting_deg.")]

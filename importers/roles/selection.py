@@ -1,0 +1,125 @@
+"""Which channel serves which purpose: by type where that is unambiguous, by the settings otherwise."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from importers.roles.messages import find_kind
+from importers.rows.log import Channel, Log
+from importers.settings import InputSettings
+from navreplay.timeline import LogError
+
+__all__ = ["NOTHING", "SETTING", "Choice", "always_used", "candidates", "choose_channels", "choose_role"]
+
+SETTING = {
+    "imu": "input.imu.channel",
+    "fix": "input.fix.channel",
+    "velocity": "input.fix.velocity_channel",
+    "range": "input.range.channel",
+    "attitude": "input.attitude.channel",
+    "reference": "input.reference.channel",
+}
+"""The setting that names the channel of a role."""
+NOTHING = "none"
+"""In place of a channel's name: no channel is to serve."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Choice:
+    """A channel of a log, chosen for a role."""
+
+    log: Log
+    channel: Channel
+    role: str
+
+
+def candidates(logs: Sequence[Log], role: str) -> list[Choice]:
+    """Channels of a type that can serve as a role, empty ones last resort: left out where another holds messages."""
+    found = [
+        Choice(log, channel, role)
+        for log in logs
+        for channel in log.channels()
+        if (kind := find_kind(channel.type)) is not None and role in kind.roles
+    ]
+    filled = [choice for choice in found if choice.channel.count != 0]
+    return filled or found
+
+
+def choose_channels(logs: Sequence[Log], settings: InputSettings, reference: Log | None) -> tuple[Choice, ...]:
+    """The channels of every role. Raises LogError where a named channel is missing or a choice is ambiguous."""
+    chosen = [choice for role in SETTING for choice in choose_role(logs, settings, reference, role)]
+    return (*chosen, *always_used(logs))
+
+
+def always_used(logs: Sequence[Log]) -> list[Choice]:
+    """Channels that serve others and need no choice: time references, and ephemerides."""
+    return [*candidates(logs, "time"), *candidates(logs, "ephemeris")]
+
+
+def choose_role(logs: Sequence[Log], settings: InputSettings, reference: Log | None, role: str) -> list[Choice]:
+    """The channels of one role: one, or its continuations from file to file, or none. Raises LogError as `choose_channels`."""
+    if role == "reference":
+        return [] if settings.reference.from_fixes else _choose_reference(logs, settings.reference.channel, reference)
+    name = {
+        "imu": settings.imu.channel,
+        "fix": settings.fix.channel,
+        "velocity": settings.fix.velocity_channel,
+        "range": settings.range.channel,
+        "attitude": settings.attitude.channel,
+    }[role]
+    if name == NOTHING:
+        return []
+    if name is not None:
+        return _named(logs, role, name)
+    return _only_one([choice for choice in candidates(logs, role) if _automatic(choice.channel, role)], role)
+
+
+def _automatic(channel: Channel, role: str) -> bool:
+    kind = find_kind(channel.type)
+    return kind is not None and kind.automatic and kind.roles[0] == role
+
+
+def _choose_reference(logs: Sequence[Log], name: str | None, reference: Log | None) -> list[Choice]:
+    """From the reference file whatever can serve; from the logs only what is meant as a reference."""
+    searched = logs if reference is None else [reference]
+    if name is not None:
+        return _named(searched, "reference", name)
+    found = candidates(searched, "reference")
+    meant = [choice for choice in found if _automatic(choice.channel, "reference")]
+    if reference is None:
+        return _only_one(meant, "reference")
+    if not found:
+        types = ", ".join(f"{channel.name} ({channel.type})" for channel in reference.channels()) or "nothing"
+        raise LogError(f"{reference.path}: no channel can serve as a reference; it holds {types}")
+    absolute = [choice for choice in found if _automatic(choice.channel, "fix")]
+    return _only_one(meant or absolute or found, "reference")
+
+
+def _named(logs: Sequence[Log], role: str, name: str) -> list[Choice]:
+    found = [Choice(log, channel, role) for log in logs for channel in log.channels() if channel.name == name]
+    place = ", ".join(Path(log.path).name for log in logs)
+    if not found:
+        there = ", ".join(channel.name for log in logs for channel in log.channels()) or "no channel at all"
+        raise LogError(f"{place}: has no channel {name}, which {SETTING[role]} names; there is {there}")
+    for choice in found:
+        kind = find_kind(choice.channel.type)
+        if kind is None or role not in kind.roles:
+            could = ", ".join(sorted({other.channel.name for other in candidates(logs, role)})) or "none"
+            raise LogError(
+                f"{place}: channel {name} is {choice.channel.type}, which cannot serve as {role} ({SETTING[role]}); "
+                f"channels that can: {could}"
+            )
+    return found
+
+
+def _only_one(found: list[Choice], role: str) -> list[Choice]:
+    """One channel, which may continue from file to file under the same name and type."""
+    names = {(choice.channel.name, choice.channel.type) for choice in found}
+    if len(names) > 1:
+        listed = "; ".join(f"{name} ({type})" for name, type in sorted(names))
+        example = sorted(names)[0][0]
+        raise LogError(
+            f"{len(names)} channels can serve as {role}: {listed}. Choose one with {SETTING[role]}, "
+            f"for instance --set {SETTING[role]}={example}"
+        )
+    return found

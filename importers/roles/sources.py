@@ -1,0 +1,158 @@
+"""Sources: the channels chosen for a role, read and joined, with their times and their accounting."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from importers.roles.messages import find_kind, stamp_column
+from importers.rows.clock import gps_from_stamps
+from importers.rows.log import Channel, Table
+from importers.rows.screening import Screening
+from importers.rows.tables import Rows
+from importers.settings import AttitudeInput, FixInput, ImuInput, ReferenceInput
+from navreplay.geodesy.time_scales import LeapSeconds
+from navreplay.timeline import ChannelUse, LogError, Times
+
+__all__ = ["Clock", "Joined", "Source", "account", "join_sources"]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Source:
+    """A channel of a file with its table, to serve in a role."""
+
+    file: str
+    channel: Channel
+    table: Table
+    role: str
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Clock:
+    """What turns stamps into GPS time. time_references: tables of TimeReference channels, for stamps that count from
+    power-on."""
+
+    leap: LeapSeconds
+    time_references: tuple[Table, ...] = ()
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Joined:
+    """The rows of one or several sources in a row. name: for messages. t_ns: (n,) GPS time. parts: the slice of each source.
+    notes: assumptions made."""
+
+    name: str
+    t_ns: Times
+    rows: Rows
+    sources: tuple[Source, ...]
+    parts: tuple[slice, ...]
+    notes: tuple[str, ...]
+
+
+def join_sources(
+    sources: Sequence[Source], settings: ImuInput | FixInput | AttitudeInput | ReferenceInput, clock: Clock
+) -> Joined:
+    """Joins the parts of a channel (a recording split into files) in the order of their first stamps. Raises LogError."""
+    notes: list[str] = []
+    timed = [(_times(source, settings, clock, notes), source) for source in sources]
+    timed.sort(key=lambda pair: int(pair[0][0]) if len(pair[0]) else 0)
+    ordered = tuple(source for _, source in timed)
+    rows = []
+    for source in ordered:
+        kind = find_kind(source.channel.type)
+        if kind is None:
+            raise LogError(
+                f"{source.file}: channel {source.channel.name} of type {source.channel.type} cannot serve as {source.role}"
+            )
+        rows.append(_extract(source))
+        if kind.note:
+            notes.append(f"{source.channel.name}: {kind.note}")
+    ends = np.cumsum([len(times) for times, _ in timed])
+    parts = tuple(slice(int(end - len(times)), int(end)) for end, (times, _) in zip(ends, timed, strict=True))
+    t_ns = np.concatenate([times for times, _ in timed])
+    if len(t_ns) == 0:
+        raise _nothing_readable(ordered[0])
+    return Joined(ordered[0].channel.name, t_ns, _concatenate(rows), ordered, parts, tuple(dict.fromkeys(notes)))
+
+
+def account(joined: Joined, screening: Screening) -> tuple[ChannelUse, ...]:
+    """The accounting of every source."""
+    uses = []
+    for source, part in zip(joined.sources, joined.parts, strict=True):
+        rejected = dict(source.table.rejected)
+        for reason, count in screening.rejected(part).items():
+            rejected[reason] = rejected.get(reason, 0) + count
+        used = source.table.read - sum(rejected.values())
+        uses.append(
+            ChannelUse(source.channel.name, source.file, source.channel.type, source.role, source.table.read, used, rejected)
+        )
+    return tuple(uses)
+
+
+def _extract(source: Source) -> Rows:
+    kind = find_kind(source.channel.type)
+    assert kind is not None
+    try:
+        return kind.rows(source.table.columns)
+    except KeyError as error:
+        if len(source.table.log_time_ns) == 0:
+            raise _nothing_readable(source) from error
+        raise LogError(
+            f"{source.file}: channel {source.channel.name} says it is {source.channel.type} but has no field {error.args[0]}"
+        ) from error
+
+
+def _nothing_readable(source: Source) -> LogError:
+    lost = ", ".join(f"{count} {reason}" for reason, count in source.table.rejected.items())
+    of = f" of {source.table.read} ({lost})" if lost else ""
+    return LogError(
+        f"{source.file}: channel {source.channel.name} holds no readable message{of}; copy the file again, or leave it out"
+    )
+
+
+def _concatenate(rows: Sequence[Rows]) -> Rows:
+    if len(rows) == 1:
+        return rows[0]
+    arrays: dict[str, Any] = {}
+    for field in fields(Rows):
+        values = [getattr(part, field.name) for part in rows]
+        if all(isinstance(value, np.ndarray) for value in values):
+            arrays[field.name] = np.concatenate(values)
+    return replace(rows[0], **arrays)
+
+
+def _times(
+    source: Source, settings: ImuInput | FixInput | AttitudeInput | ReferenceInput, clock: Clock, notes: list[str]
+) -> Times:
+    offset_ns = round(settings.time_offset_s * 1e9)
+    name, table = source.channel.name, source.table
+    if offset_ns:
+        notes.append(f"{name}: {settings.time_offset_s:g} s were added to its stamps")
+    if "t_gps_ns" in table.columns:
+        return np.asarray(table.columns["t_gps_ns"], dtype=np.int64) + offset_ns
+    stamps = stamp_column(table) if getattr(settings, "stamp", "header") == "header" else None
+    if stamps is None:
+        notes.append(f"{name}: timed by the clock of the recorder, taken as UTC")
+        return gps_from_stamps(table.log_time_ns, "utc", clock.leap) + offset_ns
+    stamps = np.asarray(stamps, dtype=np.int64)
+    if settings.time_base == "boot":
+        shift, told = _boot_shift(stamps, table, clock)
+        notes.append(f"{name}: its stamps count from power-on; {told}")
+        return gps_from_stamps(stamps + shift, "utc", clock.leap) + offset_ns
+    if settings.time_base == "auto":
+        notes.append(f"{name}: its stamps are taken as UTC")
+    return gps_from_stamps(stamps, settings.time_base, clock.leap) + offset_ns
+
+
+def _boot_shift(stamps: Times, table: Table, clock: Clock) -> tuple[int, str]:
+    """What to add to stamps from power-on to get UTC [ns]. By the recorder it is the least delay seen, since delays only
+    add."""
+    for reference in clock.time_references:
+        own = stamp_column(reference)
+        if own is not None and len(own) and "time_ref" in reference.columns:
+            shift = int(np.median(reference.columns["time_ref"].astype(np.int64) - own.astype(np.int64)))
+            return shift, "they were set to UTC by the time-reference channel"
+    if len(stamps) == 0:
+        return 0, "but there is none"
+    return int(np.min(table.log_time_ns - stamps)), "they were set to UTC by the clock of the recorder (smallest delay)"

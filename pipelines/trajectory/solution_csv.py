@@ -1,0 +1,149 @@
+"""solution.csv: the trajectory as other programs read it (columns and digits in docs/report.md)."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+from pyarrow import csv
+
+from navreplay.geodesy.rotation import euler_from_quat
+from navreplay.geodesy.time_scales import gps_from_week_tow, utc_from_gps, week_tow_from_gps
+from navreplay.solution import RowStatus, Solution
+from navreplay.timeline import Floats, LogError, Times
+
+__all__ = ["COLUMNS", "SolutionTable", "euler_std", "read_solution_csv", "utc_text", "write_solution_csv"]
+
+_DPH = np.degrees(3600)
+_MG = 1 / 9.80665e-3
+
+COLUMNS = {
+    "gps_week": "%d",
+    "gps_tow_s": "%d.%09d",
+    "utc": "%s",
+    "lat_deg": "%.11f",
+    "lon_deg": "%.11f",
+    "height_m": "%.5f",
+    "vel_n_mps": "%.6f",
+    "vel_e_mps": "%.6f",
+    "vel_d_mps": "%.6f",
+    "roll_deg": "%.7f",
+    "pitch_deg": "%.7f",
+    "yaw_deg": "%.7f",
+    "std_n_m": "%.6g",
+    "std_e_m": "%.6g",
+    "std_d_m": "%.6g",
+    "std_vn_mps": "%.6g",
+    "std_ve_mps": "%.6g",
+    "std_vd_mps": "%.6g",
+    "std_roll_deg": "%.6g",
+    "std_pitch_deg": "%.6g",
+    "std_yaw_deg": "%.6g",
+    "gyro_bias_x_dph": "%.6f",
+    "gyro_bias_y_dph": "%.6f",
+    "gyro_bias_z_dph": "%.6f",
+    "accel_bias_x_mg": "%.6f",
+    "accel_bias_y_mg": "%.6f",
+    "accel_bias_z_mg": "%.6f",
+    "status": "%s",
+}
+"""Column names in order, with their formats: a latitude to a micrometre, a time of week to a nanosecond."""
+
+_NUMBERS = tuple(name for name in COLUMNS if name not in ("gps_week", "gps_tow_s", "utc", "status"))
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class SolutionTable:
+    """A solution.csv read back. t_ns: (k,) GPS time. lla: (k, 3) [rad, rad, m]. vel_n: (k, 3) [m/s]. rpy: (k, 3) roll, pitch,
+    yaw [rad]. std: (k, 9) position [m], velocity [m/s], roll, pitch, yaw [rad]. gyro_bias: (k, 3) [rad/s]. accel_bias:
+    (k, 3) [m/s^2]. status: k names."""
+
+    t_ns: Times
+    lla: Floats
+    vel_n: Floats
+    rpy: Floats
+    std: Floats
+    gyro_bias: Floats
+    accel_bias: Floats
+    status: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.t_ns)
+
+
+def utc_text(t_ns: Times) -> list[str]:
+    """GPS times (k,) as ISO 8601 in UTC, to the microsecond."""
+    utc = np.asarray(utc_from_gps(t_ns)).astype("datetime64[ns]").astype("datetime64[us]")
+    return [f"{text}Z" for text in np.datetime_as_string(utc).tolist()]
+
+
+def euler_std(q_nb: Floats, cov: Floats) -> Floats:
+    """Standard deviations (k, 3) of roll, pitch, yaw [rad] from the covariance (k, 3, 3) of the rotation vector in n.
+
+    First order; next to a pitch of 90 degrees, where roll and yaw lose their meaning, they are held finite.
+    """
+    _, pitch, yaw = np.moveaxis(euler_from_quat(q_nb), -1, 0)
+    cosine = np.maximum(np.cos(pitch), 1e-3)
+    zero = np.zeros_like(yaw)
+    along = np.stack([np.cos(yaw), np.sin(yaw), zero], axis=1) / cosine[:, None]
+    across = np.stack([-np.sin(yaw), np.cos(yaw), zero], axis=1)
+    down = np.sin(pitch)[:, None] * along + np.array([0.0, 0.0, 1.0])
+    jacobian = np.stack([along, across, down], axis=1)
+    return np.asarray(np.sqrt(np.einsum("kij,kjl,kil->ki", jacobian, cov, jacobian)))
+
+
+def _number_columns(solution: Solution) -> Floats:
+    return np.concatenate(
+        [
+            np.degrees(solution.lla[:, :2]),
+            solution.lla[:, 2:],
+            solution.vel_n,
+            np.degrees(euler_from_quat(solution.q_nb)),
+            solution.std[:, :6],
+            np.degrees(euler_std(solution.q_nb, solution.cov[:, 6:9, 6:9])),
+            solution.gyro_bias * _DPH,
+            solution.accel_bias * _MG,
+        ],
+        axis=1,
+    )
+
+
+def write_solution_csv(path: Path, solution: Solution) -> None:
+    """Writes the solution, the same bytes for the same solution."""
+    week, _ = week_tow_from_gps(solution.t_ns)
+    week_start = gps_from_week_tow(week, np.zeros(len(week)))
+    second, nanosecond = np.divmod(solution.t_ns - week_start, 1_000_000_000)
+    numbers = _number_columns(solution)
+    names = {status: status.name.lower() for status in RowStatus}
+    status = [names[RowStatus(value)] for value in solution.status.tolist()]
+    columns = [week.tolist(), second.tolist(), nanosecond.tolist(), utc_text(solution.t_ns), *numbers.T.tolist(), status]
+    line = ",".join(COLUMNS.values()) + "\n"
+    with path.open("w", encoding="ascii", newline="") as file:
+        file.write(",".join(COLUMNS) + "\n")
+        file.writelines(line % row for row in zip(*columns, strict=True))
+
+
+def read_solution_csv(path: Path) -> SolutionTable:
+    """Reads what `write_solution_csv` wrote. Raises LogError when the file is missing, empty or of another layout."""
+    types = {name: pa.float64() for name in (*_NUMBERS, "gps_tow_s")} | {"gps_week": pa.int64(), "status": pa.string()}
+    options = csv.ConvertOptions(column_types=types, include_columns=[name for name in COLUMNS if name != "utc"])
+    try:
+        table = csv.read_csv(path, convert_options=options)
+    except OSError as error:
+        raise LogError(f"{path}: cannot read the solution; is this folder what `navreplay run -o` wrote? ({error})") from error
+    except (pa.ArrowInvalid, KeyError) as error:
+        raise LogError(f"{path}: not a solution.csv of navreplay: {' '.join(str(error).split())}") from error
+    if len(table) == 0:
+        raise LogError(f"{path}: the solution holds no rows")
+    values = np.stack([table[name].to_numpy() for name in _NUMBERS], axis=1)
+    degrees = np.radians(values)
+    return SolutionTable(
+        t_ns=gps_from_week_tow(table["gps_week"].to_numpy(), table["gps_tow_s"].to_numpy()),
+        lla=np.concatenate([degrees[:, :2], values[:, 2:3]], axis=1),
+        vel_n=values[:, 3:6],
+        rpy=degrees[:, 6:9],
+        std=np.concatenate([values[:, 9:15], degrees[:, 15:18]], axis=1),
+        gyro_bias=values[:, 18:21] / _DPH,
+        accel_bias=values[:, 21:24] / _MG,
+        status=tuple(table["status"].to_pylist()),
+    )
