@@ -1,0 +1,1 @@
+"""Words of navigation messages into ephemerides, a file per constellation. Uses satellites; a new message is decoded here."""
