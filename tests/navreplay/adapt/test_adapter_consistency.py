@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from navreplay.update.measurement import Measurement
 
 from navreplay.adapt.likelihood.maximum_likelihood import MaximumLikelihood
 from navreplay.filters.moments import Linearised
 from navreplay.filters.presets import Method, build_method
 from navreplay.update.gaussian import Gaussian, chi_square, condition, symmetric
+from navreplay.update.measurement import Measurement
 
 AXES = np.eye(3)
 TRANSITION = np.kron(AXES, [[1.0, 1.0], [0.0, 1.0]])

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from navreplay.update.measurement import Measurement
 from scipy.stats import multivariate_normal
 
 from navreplay.adapt.inflation.h_infinity import HInfinity
@@ -24,6 +23,7 @@ from navreplay.adapt.windowed.sage_husa import SageHusa
 from navreplay.filters.moments import Linearised
 from navreplay.filters.presets import PRESETS, build_method
 from navreplay.update.gaussian import Gaussian, Innovation, condition
+from navreplay.update.measurement import Measurement
 
 LABELS = tuple("abcdef")
 

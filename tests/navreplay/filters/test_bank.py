@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from navreplay.update.measurement import Measurement
 
 import synthetic_logs
 from navreplay.error_models.ned import Propagated
@@ -21,6 +20,7 @@ from navreplay.options import FilterOptions
 from navreplay.solution import Solution
 from navreplay.timeline import LogError, Timeline
 from navreplay.update.gaussian import Gaussian, chi_square, condition
+from navreplay.update.measurement import Measurement
 from pipelines.config.spec import validate
 from pipelines.drive.process import Drive, filter_drive
 from pipelines.recording.view import write_recording

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from navreplay.update.measurement import Measurement
 
 import synthetic_logs
 from navreplay.adapt.inflation.partial_tracking import PartialTracking
@@ -20,6 +19,7 @@ from navreplay.options import ConsiderOptions, FilterOptions, GateOptions
 from navreplay.solution import Solution
 from navreplay.timeline import LogError, Timeline
 from navreplay.update.gaussian import Gaussian, chi_square, condition, kalman_gain
+from navreplay.update.measurement import Measurement
 from pipelines.config.spec import filter_options, validate
 
 FLIGHT = synthetic_logs.SCENARIOS["uav-flight"]

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from navreplay.update.measurement import Measurement
 
 from navreplay.error_models.clocked import ClockedModel
 from navreplay.error_models.free_motion import FreeMotionModel
@@ -17,6 +16,7 @@ from navreplay.measurements.ranges import RangeNoise, carried_antenna, free_ante
 from navreplay.mechanisation.strapdown import Leg, NavState, idle_steps
 from navreplay.options import GRADES, GateOptions, MotionOptions, RangeOptions
 from navreplay.update.gaussian import Innovation
+from navreplay.update.measurement import Measurement
 from navreplay.update.range_gate import RangeGate
 from tests.helpers.range_samples import DRIFT, OFFSETS, PLACE, SKY, START_NS, make_ranges
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from navreplay.update.measurement import Measurement
 
 from navreplay.filters.moments import Linearised
 from navreplay.filters.presets import PRESETS, build_method
 from navreplay.timeline import LogError
 from navreplay.update.gaussian import Gaussian, Innovation, chi_square, condition, kalman_gain
+from navreplay.update.measurement import Measurement
 
 
 def random_problem(seed: int, n: int = 6, m: int = 3) -> tuple[Gaussian, Measurement]:
