@@ -15,6 +15,7 @@ from navreplay.geodesy import earth
 from navreplay.geodesy.launch_frame import LaunchFrame, LaunchState
 from navreplay.geodesy.rotation import skew
 from navreplay.mechanisation import _launch_kernel
+from navreplay.mechanisation._kernel_arrays import Driving
 from navreplay.mechanisation.strapdown import Leg, NavState
 from navreplay.options import FilterOptions
 from navreplay.timeline import Floats, LogError
@@ -31,20 +32,16 @@ class LaunchInertialModel(NedErrorModel):
 
     def propagate(self, state: NavState, cov: Floats, leg: Leg, cross: Floats | None = None) -> Propagated:
         """See `NedErrorModel.propagate`."""
-        steps, part = leg.steps, leg.part
+        steps = leg.steps
         times = np.append(steps.start_ns if leg.first == 0 else steps.t_ns[leg.first - 1], steps.t_ns[leg.ends - 1])
         elapsed = (times - self.launch_ns) / 1e9
         k = len(leg.ends)
         states, transitions, noises = np.empty((k, 16)), np.empty((k, 15, 15)), np.empty((k, 15, 15))
         _launch_kernel.propagate_launch(
             self._pack(elapsed[0], state),
-            steps.dt[part],
-            steps.dtheta[part],
-            steps.dvel[part],
-            steps.bridged[part],
+            leg.rows,
             leg.counts,
-            self.density(),
-            self.correlation_time(),
+            Driving(self.density(), self.correlation_time()),
             leg.interval,
             np.ascontiguousarray(self.frame.c_il),
             self.frame.origin_i @ self.frame.c_il,

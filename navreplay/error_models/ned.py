@@ -6,11 +6,13 @@ Layout, noise, initial covariance, retraction and propagation. The equations the
 
 from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
 from navreplay.geodesy import earth, rotation
 from navreplay.mechanisation import _ned_kernel
+from navreplay.mechanisation._kernel_arrays import Driving
 from navreplay.mechanisation.strapdown import Leg, NavState
 from navreplay.options import ImuNoise
 from navreplay.timeline import Floats
@@ -34,8 +36,7 @@ _MARKOV_NAMES = ("gyro_markov_x", "gyro_markov_y", "gyro_markov_z")
 _UNITS = tuple(unit for unit in ("m", "m/s", "rad", "rad/s", "m/s^2") for _ in range(3))
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Propagated:
+class Propagated(NamedTuple):
     """States (k, w), covariances (k, n, n) and crosses (k, n, c) at k nodes; transitions and noises (k, n, n) from the node
     before to each, or without rows where they were not asked for."""
 
@@ -165,28 +166,11 @@ class NedErrorModel:
         cross = np.empty((self.size, 0)) if cross is None else cross
         packed = state.pack()
         out = Propagated.allocate(len(leg.ends), len(packed), cross, leg.keep)
-        steps, part = leg.steps, leg.part
-        _ned_kernel.propagate(
-            packed,
-            cov,
-            cross,
-            steps.dt[part],
-            steps.dtheta[part],
-            steps.dvel[part],
-            steps.bridged[part],
-            leg.counts,
-            *_driving_noise(self),
-            leg.interval,
-            out.states,
-            out.covariances,
-            out.crosses,
-            out.transitions,
-            out.noises,
-        )
+        _ned_kernel.propagate(packed, cov, cross, leg.rows, leg.counts, _driving_noise(self), leg.interval, out)
         return out
 
 
 @cache
-def _driving_noise(model: NedErrorModel) -> tuple[Floats, Floats]:
+def _driving_noise(model: NedErrorModel) -> Driving:
     """Densities and correlation times, which every epoch asks for."""
-    return model.density(), model.correlation_time()
+    return Driving(model.density(), model.correlation_time())

@@ -40,18 +40,8 @@ class PointwiseModel(NedErrorModel):
         """
         cross = np.empty((self.size, 0)) if cross is None else cross
         moved = NedErrorModel.propagate(self, state, cov, leg.keeping(), cross)
-        steps, part = leg.steps, leg.part
+        extra = self.attitude_states - 3
         _cubature_kernel.propagate(
-            state.pack(),
-            cov,
-            cross,
-            steps.dt[part],
-            steps.dtheta[part],
-            steps.dvel[part],
-            leg.counts,
-            self.correlation_time(),
-            leg.interval,
-            self.attitude_states - 3,
-            *(moved.states, moved.covariances, moved.crosses, moved.transitions, moved.noises),
+            state.pack(), cov, cross, leg.rows, leg.counts, self.correlation_time(), leg.interval, extra, moved
         )
         return moved

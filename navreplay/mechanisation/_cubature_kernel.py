@@ -155,17 +155,16 @@ def _carry(x, dt, dtheta, dvel, first, last, tau, fading, n, c, dv_n, body):
 
 
 @njit(cache=True)
-def propagate(
-    start, p_start, cross_start, dt, dtheta, dvel, ends, tau, interval, extra, states, covariances, crosses, transitions, noises
-):
+def propagate(start, p_start, cross_start, steps, ends, tau, interval, extra, nodes):
     """Moments over k nodes, from points drawn anew behind each.
 
     start (w), p_start (n, n), cross_start (n, c), steps, ends (k), tau (n - 9) and interval as in `_ned_kernel.propagate`;
     points and a nominal state beside them take merged steps. extra: 1 for the additive quaternion, 0 for the rotation vector.
-    transitions, noises (k, n, n): on entry those of the linear model, on return the statistically linearised transition and
-    what makes the covariance complete beside it. Filled: states (k, w), covariances (k, n, n), crosses (k, n, c).
+    nodes: filled; its transitions and noises are on entry those of the linear model, on return the statistically linearised
+    transition and what makes the covariance complete beside it.
     """
     n, w, k = p_start.shape[0], start.shape[0], ends.shape[0]
+    dt, dtheta, dvel, transitions, noises = steps.dt, steps.dtheta, steps.dvel, nodes.transitions, nodes.noises
     additive = extra == 1
     count = n + extra
     reach = math.sqrt(count)
@@ -208,6 +207,6 @@ def propagate(
         if cross.shape[1] > 0:
             cross = transitions[node] @ cross
         step, coarse = ends[node], merged[node]
-        states[node] = x
-        covariances[node] = p
-        crosses[node] = cross
+        nodes.states[node] = x
+        nodes.covariances[node] = p
+        nodes.crosses[node] = cross

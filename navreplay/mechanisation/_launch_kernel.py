@@ -89,13 +89,13 @@ def _fill_rate_matrix(span, gradient, c_dt, force, a):
 
 
 @njit(cache=True)
-def propagate_launch(start, dt, dtheta, dvel, bridged, ends, density, tau, interval, c_il, centre, states, transitions, noises):
+def propagate_launch(start, steps, ends, driving, interval, c_il, centre, states, transitions, noises):
     """Mechanisation and error dynamics over k nodes.
 
-    start (16): at the beginning. dt, dtheta, dvel, bridged: steps. ends (k): number of steps up to and with each node. density
-    (15): white-noise densities. tau (6): correlation times of the biases. interval [s]: longest covariance step. c_il (3, 3),
-    centre (3): of the frame. Filled: states (k, 16), transitions and noises (k, 15, 15) from the node before to each.
+    start (16): at the beginning. steps, ends (k), driving and interval [s] as in `_ned_kernel.propagate`. c_il (3, 3), centre
+    (3): of the frame. Filled: states (k, 16), transitions and noises (k, 15, 15) from the node before to each.
     """
+    tau, density = driving.tau, driving.density
     x = start.copy()
     a, phi, work, decay = np.empty((9, 15)), np.empty((9, 15)), np.empty((9, 15)), np.ones(6)
     c, c_start, c_dt, gradient = np.empty((3, 3)), np.empty((3, 3)), np.zeros((3, 3)), np.empty((3, 3))
@@ -108,16 +108,16 @@ def propagate_launch(start, dt, dtheta, dvel, bridged, ends, density, tau, inter
         span = 0.0
         bridge = 0.0
         while step < ends[node]:
-            h = dt[step]
+            h = steps.dt[step]
             c_start[:, :] = c
-            _step(x, h, dtheta[step], dvel[step], c, c_il, centre, force, middle, g_l)
+            _step(x, h, steps.dtheta[step], steps.dvel[step], c, c_il, centre, force, middle, g_l)
             for i in range(3):
                 f_dt[i] += force[i]
                 for j in range(3):
                     c_dt[i, j] += 0.5 * (c_start[i, j] + c[i, j]) * h
             for i in range(6):
                 x[10 + i] *= math.exp(-h / tau[i])
-            if bridged[step]:
+            if steps.bridged[step]:
                 bridge += h * h
             span += h
             step += 1

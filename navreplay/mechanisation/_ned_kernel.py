@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 
 from navreplay.geodesy import earth
+from navreplay.mechanisation._kernel_arrays import Sums
 from navreplay.mechanisation._strapdown_kernel import fade, fill_matrix, take_step
 
 __all__ = ["BRIDGE_ACCEL", "BRIDGE_RATE", "fill_transition", "move_covariance", "multiply_left", "propagate"]
@@ -27,9 +28,10 @@ BRIDGE_RATE = 0.1
 
 
 @njit(cache=True)
-def _fill_rate_matrix(x, span, c_dt, dv_n, c_theta, c_dvel, a):
+def _fill_rate_matrix(x, span, sums, a):
     """a (9, n): integral of the error dynamics' rows of position, velocity and attitude over span [s]."""
     n = a.shape[1]
+    c_dt, dv_n, c_theta, c_dvel = sums.c_dt, sums.f_dt, sums.c_theta, sums.c_dvel
     a[:, :] = 0
     lat, height = x[0], x[2]
     vn, ve, vd = x[3], x[4], x[5]
@@ -166,16 +168,16 @@ def move_covariance(phi, decay, density, span, bridge, p, work):
 
 
 @njit(cache=True)
-def _accumulate(h, c_start, c_end, dv_n, body, c_dt, f_dt, c_theta, c_dvel):
+def _accumulate(h, c_start, c_end, dv_n, body, sums):
     """Adds a step of h [s] to the integrals that the error dynamics need: of C_nb, of specific force in n, and of C_nb times
     the body's rate and specific force, axis by axis."""
     for i in range(3):
-        f_dt[i] += dv_n[i]
+        sums.f_dt[i] += dv_n[i]
         for j in range(3):
             c_mean = 0.5 * (c_start[i, j] + c_end[i, j])
-            c_dt[i, j] += c_mean * h
-            c_theta[i, j] += c_mean * body[j]
-            c_dvel[i, j] += c_mean * body[3 + j]
+            sums.c_dt[i, j] += c_mean * h
+            sums.c_theta[i, j] += c_mean * body[j]
+            sums.c_dvel[i, j] += c_mean * body[3 + j]
 
 
 @njit(cache=True)
@@ -230,90 +232,73 @@ def _gather_totals(phi, decay, density, span, bridge, fresh, total_phi, total_q,
 
 
 @njit(cache=True)
-def _clear(c_dt, f_dt, c_theta, c_dvel):
+def _clear(sums):
     """Empties what `_accumulate` has summed up."""
-    c_dt[:, :] = 0
-    f_dt[:] = 0
-    c_theta[:, :] = 0
-    c_dvel[:, :] = 0
+    sums.c_dt[:, :] = 0
+    sums.f_dt[:] = 0
+    sums.c_theta[:, :] = 0
+    sums.c_dvel[:, :] = 0
 
 
 @njit(cache=True)
-def propagate(
-    start,
-    p_start,
-    cross_start,
-    dt,
-    dtheta,
-    dvel,
-    bridged,
-    ends,
-    density,
-    tau,
-    interval,
-    states,
-    covariances,
-    crosses,
-    transitions,
-    noises,
-):
+def _mechanise(x, steps, first, last, tau, interval, c, sums):
+    """Moves packed x and its matrix c over steps from first until interval [s] is full or last is reached, and fills sums.
+
+    Returns the next step, the time moved over [s], and the sum of squares of what was bridged [s^2]."""
+    c_start, dv_n, body = np.empty((3, 3)), np.empty(3), np.empty(6)
+    fading = np.isfinite(tau).any()
+    step, span, bridge = first, 0.0, 0.0
+    while True:
+        h = steps.dt[step]
+        c_start[:, :] = c
+        take_step(x, h, steps.dtheta[step], steps.dvel[step], c, dv_n, body)
+        _accumulate(h, c_start, c, dv_n, body, sums)
+        if fading:
+            fade(x, h, tau, 9 + tau.shape[0])
+        if steps.bridged[step]:
+            bridge += h * h
+        span += h
+        step += 1
+        if span >= interval or step >= last:
+            return step, span, bridge
+
+
+@njit(cache=True)
+def propagate(start, p_start, cross_start, steps, ends, driving, interval, nodes):
     """Mechanisation and covariance over k nodes.
 
-    start (w), p_start (n, n): at the beginning; cross_start (n, c): covariance with c states that do not move. dt, dtheta,
-    dvel, bridged: steps. ends (k): number of steps up to and with each node, the first counted from 0; nodes share no
-    step. density (n): white-noise densities. tau (n - 9): correlation times of the sensor errors, inf for random walks.
-    interval [s]: longest covariance step. Filled: states (k, w), covariances (k, n, n), crosses (k, n, c) and, unless they have
-    no rows, transitions and noises (k, n, n) of the node's whole interval.
+    start (w), p_start (n, n): at the beginning; cross_start (n, c): covariance with c states that do not move. steps:
+    `StepRows`. ends (k): number of steps up to and with each node, the first counted from 0; nodes share no step. driving:
+    `Driving`. interval [s]: longest covariance step. nodes: `navreplay.error_models.ned.Propagated`, filled; transitions and
+    noises unless they have no rows.
     """
     n = p_start.shape[0]
-    x = start.copy()
-    p = p_start.copy()
-    cross = cross_start.copy()
-    a = np.empty((9, n))
-    phi = np.empty((9, n))
+    x, p, cross = start.copy(), p_start.copy(), cross_start.copy()
+    a, phi, decay = np.empty((9, n)), np.empty((9, n)), np.ones(n - 9)
     work = np.empty((9, max(n, cross.shape[1])))
-    decay = np.ones(n - 9)
-    c, c_start, dv_n, body = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(6)
-    c_dt, f_dt, c_theta, c_dvel = np.zeros((3, 3)), np.zeros(3), np.zeros((3, 3)), np.zeros((3, 3))
-    keep = transitions.shape[0] > 0
-    fading = np.isfinite(tau).any()
-    total_phi = np.eye(n)
-    total_q = np.zeros((n, n))
+    c, sums = np.empty((3, 3)), Sums(np.zeros((3, 3)), np.zeros(3), np.zeros((3, 3)), np.zeros((3, 3)))
+    keep = nodes.transitions.shape[0] > 0
+    total_phi, total_q = np.eye(n), np.zeros((n, n))
     step = 0
     fill_matrix(x[6], x[7], x[8], x[9], c)
     for node in range(ends.shape[0]):
         fresh = True
-        span = 0.0
-        bridge = 0.0
         while step < ends[node]:
-            h = dt[step]
-            c_start[:, :] = c
-            take_step(x, h, dtheta[step], dvel[step], c, dv_n, body)
-            _accumulate(h, c_start, c, dv_n, body, c_dt, f_dt, c_theta, c_dvel)
-            if fading:
-                fade(x, h, tau, n)
-            if bridged[step]:
-                bridge += h * h
-            span += h
-            step += 1
-            if span < interval and step < ends[node]:
-                continue
-            _fill_rate_matrix(x, span, c_dt, f_dt, c_theta, c_dvel, a)
+            step, span, bridge = _mechanise(x, steps, step, ends[node], driving.tau, interval, c, sums)
+            _fill_rate_matrix(x, span, sums, a)
+            _clear(sums)
             fill_transition(a, phi)
             for i in range(n - 9):
-                decay[i] = math.exp(-span / tau[i])
-            move_covariance(phi, decay, density, span, bridge, p, work)
+                decay[i] = math.exp(-span / driving.tau[i])
+            move_covariance(phi, decay, driving.density, span, bridge, p, work)
             if cross.shape[1] > 0:
                 multiply_left(phi, decay, cross, work)
             if keep:
-                _gather_totals(phi, decay, density, span, bridge, fresh, total_phi, total_q, work)
+                _gather_totals(phi, decay, driving.density, span, bridge, fresh, total_phi, total_q, work)
             fresh = False
-            span = 0.0
-            bridge = 0.0
-            _clear(c_dt, f_dt, c_theta, c_dvel)
-        states[node] = x
-        covariances[node] = p
-        crosses[node] = cross
+        nodes.states[node] = x
+        nodes.covariances[node] = p
+        nodes.crosses[node] = cross
         if keep:
-            transitions[node] = total_phi
-            noises[node] = total_q
+            nodes.transitions[node] = total_phi
+            nodes.noises[node] = total_q

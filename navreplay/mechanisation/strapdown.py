@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navreplay.mechanisation import _strapdown_kernel
+from navreplay.mechanisation._kernel_arrays import StepRows
 from navreplay.timeline import Floats, ImuSeries, LogError, Times, Trajectory
 
 __all__ = [
@@ -69,6 +70,12 @@ class Leg:
     def part(self) -> slice:
         """The leg's steps among all."""
         return slice(self.first, int(self.ends[-1]))
+
+    @property
+    def rows(self) -> StepRows:
+        """The leg's steps, as kernels take them."""
+        steps, part = self.steps, self.part
+        return StepRows(steps.dt[part], steps.dtheta[part], steps.dvel[part], steps.bridged[part])
 
     @property
     def counts(self) -> NDArray[np.intp]:

@@ -331,9 +331,8 @@ def test_compiled_kernel_equals_its_source():
     fast = model.propagate(flying_state(), cov, Leg(steps, 0, ends, 0.02))
     slow = NedErrorModel(TACTICAL).propagate(flying_state(), cov, Leg(steps, 0, ends, 0.02, keep=True))
     empty, tau = np.empty((15, 0)), model.correlation_time()
-    filled = slow.states, slow.covariances, slow.crosses, slow.transitions, slow.noises
     _cubature_kernel.propagate.py_func(
-        flying_state().pack(), cov, empty, steps.dt, steps.dtheta, steps.dvel, ends, tau, 0.02, 1, *filled
+        flying_state().pack(), cov, empty, Leg(steps, 0, ends, 0.02).rows, ends, tau, 0.02, 1, slow
     )
     np.testing.assert_allclose(fast.states, slow.states, rtol=1e-12)
     np.testing.assert_allclose(fast.covariances, slow.covariances, rtol=1e-7, atol=1e-13)

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from navreplay.error_models.ned import Propagated
 from navreplay.geodesy import earth, rotation
 from navreplay.mechanisation import _ned_kernel, _strapdown_kernel
+from navreplay.mechanisation._kernel_arrays import Driving, StepRows
 from navreplay.mechanisation.strapdown import NavState, integrate_steps, make_steps, mechanise, split_at_long_gaps
 from navreplay.timeline import ImuSeries
 
@@ -99,10 +101,8 @@ def run_propagate(imu, state, p, interval, nodes, keep=True, tau=None, density=N
     density = np.zeros(n) if density is None else density
     out = np.empty((k, 28)), np.empty((k, n, n)), np.empty((k, n, 0)), np.empty((k * keep, n, n)), np.empty((k * keep, n, n))
     cross = np.empty((n, 0))
-    _ned_kernel.propagate(
-        *(state.pack(), p, cross, steps.dt, steps.dtheta, steps.dvel, steps.bridged, np.array(nodes)),
-        *(density, tau, interval, *out),
-    )
+    rows = StepRows(steps.dt, steps.dtheta, steps.dvel, steps.bridged)
+    _ned_kernel.propagate(state.pack(), p, cross, rows, np.array(nodes), Driving(density, tau), interval, Propagated(*out))
     return out[0], out[1], *out[3:]
 
 
