@@ -22,6 +22,7 @@ __all__ = [
     "ImuSeries",
     "LogError",
     "Provenance",
+    "RangeColumns",
     "RangeSeries",
     "SourceFile",
     "Timeline",
@@ -155,7 +156,24 @@ class GnssFixSeries:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class RangeSeries:
+class RangeColumns:
+    """The columns of observed ranges, a row per satellite signal and epoch: as read (`importers.rows.ranges.RangeRows`) and as
+    filtered (`RangeSeries`, which says what each holds)."""
+
+    t_ns: Times
+    sat: NDArray[np.str_]
+    signal: NDArray[np.str_]
+    pseudorange: Floats
+    range_rate: Floats
+    pseudorange_std: Floats
+    range_rate_std: Floats
+    cn0: Floats
+    sat_pos_e: Floats
+    sat_vel_e: Floats
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class RangeSeries(RangeColumns):
     """Pseudoranges and range rates of one receiver: a row per satellite signal and epoch, rows in the order of time.
 
     t_ns: (n,) receive time, equal within an epoch. sat: (n,) such as ``G05`` (RINEX system letter and number). signal: (n,)
@@ -168,16 +186,6 @@ class RangeSeries:
     Raises LogError unless times never fall and pseudoranges and satellite states are finite.
     """
 
-    t_ns: Times
-    sat: NDArray[np.str_]
-    signal: NDArray[np.str_]
-    pseudorange: Floats
-    range_rate: Floats
-    pseudorange_std: Floats
-    range_rate_std: Floats
-    cn0: Floats
-    sat_pos_e: Floats
-    sat_vel_e: Floats
     ionosphere_removed: bool = False
     troposphere_removed: bool = False
     klobuchar: Floats | None = None

@@ -1,7 +1,7 @@
 """Raw pseudoranges as a series: one signal per satellite and epoch, corrected for the satellite, with its state."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 
@@ -62,7 +62,7 @@ def convert_ranges(
     if len(kept) == 0:
         raise LogError(f"{name}: none of its {n} pseudoranges is usable: {_count(screening)}; {_cause(screening, ephemerides)}")
     order = kept[np.lexsort((rows.sat[kept], rows.t_ns[kept]))]
-    chosen = RangeRows(**{field: getattr(rows, field)[order] for field in RangeRows.__slots__})
+    chosen = RangeRows(**{field.name: getattr(rows, field.name)[order] for field in fields(RangeRows)})
     series, told = _build(name, chosen)
     series, model = _with_ionosphere(name, series, flat, ephemerides)
     return series, (*account(joined, screening), *uses), (*notes, *told, *model)

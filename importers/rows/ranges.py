@@ -7,7 +7,7 @@ from enum import IntFlag
 import numpy as np
 from numpy.typing import NDArray
 
-from navreplay.timeline import Floats, Times
+from navreplay.timeline import RangeColumns
 
 __all__ = ["SYSTEMS", "Applied", "RangeRows", "join_range_rows", "range_rows", "satellite_names"]
 
@@ -33,23 +33,13 @@ class Applied(IntFlag):
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class RangeRows:
+class RangeRows(RangeColumns):
     """Observations, one row per satellite signal and epoch, in any order; see `navreplay.timeline.RangeSeries`.
 
     sat is empty where the file names none that exists. sat_pos_e, sat_vel_e: NaN where the file has no satellite states.
     applied: (n,) of `Applied`.
     """
 
-    t_ns: Times
-    sat: NDArray[np.str_]
-    signal: NDArray[np.str_]
-    pseudorange: Floats
-    range_rate: Floats
-    pseudorange_std: Floats
-    range_rate_std: Floats
-    cn0: Floats
-    sat_pos_e: Floats
-    sat_vel_e: Floats
     applied: NDArray[np.int64]
 
 
