@@ -32,10 +32,12 @@ def _late(delay: float) -> Callable[[SyntheticLog, Floats], Floats]:
 
     def change(log: SyntheticLog, vel_n: Floats) -> Floats:
         assert log.fixes is not None
-        start = log.scenario.journey.start_ns
-        then = np.maximum(log.fixes.t_ns - round(delay * 1e9), start)
-        journey = log.scenario.journey
-        return np.asarray(vel_n - truth_at(journey, log.fixes.t_ns).vel_n + truth_at(journey, then).vel_n)
+        journey, t_ns = log.scenario.journey, log.fixes.t_ns
+        then = t_ns - round(delay * 1e9)
+        known = then >= journey.start_ns
+        late = vel_n.copy()
+        late[known] += truth_at(journey, then[known]).vel_n - truth_at(journey, t_ns[known]).vel_n
+        return late
 
     return change
 
