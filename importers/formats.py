@@ -7,6 +7,7 @@ from pathlib import Path
 from importers.rinex.navigation import is_rinex_navigation, read_rinex_navigation
 from importers.rinex.observation import is_rinex_observation, read_rinex_observation
 from importers.rinex.sp3 import is_sp3, read_sp3
+from importers.rinex.text import other_kind
 from importers.rows.clock import leap_seconds
 from importers.rows.log import Log
 from importers.settings import InputSettings
@@ -19,6 +20,7 @@ from importers.text.nmea import is_nmea, read_nmea
 from importers.text.rtklib_pos import is_pos, read_pos
 from importers.text.smartphone import is_smartphone, read_smartphone
 from importers.text.tum import is_tum, read_tum
+from importers.text.unix_compress import is_compressed, unpack
 from importers.ublox.stream import UbxLog, is_ubx
 from navreplay.geodesy.time_scales import LEAP_SECONDS
 from navreplay.timeline import LogError
@@ -54,6 +56,12 @@ def open_log(path: str | Path, settings: InputSettings | None = None) -> Log:
         raise LogError(
             f"{name}: does not begin like a {binary.description.split(',')[0].split(' with')[0]}; damaged, or misnamed?"
         )
+    kind = other_kind(_text(head))
+    if kind:
+        raise LogError(
+            f"{name}: a RINEX file of {kind}, which is not used; precise clocks come with the orbits of an SP3 file, "
+            "ephemerides from a navigation file"
+        )
     raise LogError(
         f"{name}: unknown format; by its content it is none of {', '.join(known.name for known in FORMATS)}. "
         "A table of numbers needs an [[input.csv]] entry that names its columns"
@@ -64,6 +72,8 @@ def _read_head(path: str) -> bytes:
     try:
         with Path(path).open("rb") as file:
             head = file.read(_HEAD_BYTES)
+            if is_compressed(head):
+                head = unpack(path, head + file.read())[:_HEAD_BYTES]
     except OSError as error:
         raise LogError(f"{path}: cannot be read: {error.strerror}") from error
     if not head:
@@ -181,8 +191,13 @@ FORMATS: tuple[Format, ...] = (
     Format("pos", "RTKLIB position file", (".pos",), _open_pos),
     Format("nmea", "NMEA 0183 (GGA and RMC)", (".nmea", ".gga"), _open_nmea),
     Format("kf-gins", "KF-GINS text: IMU increments, GNSS positions", (".txt",), _open_kf_gins),
-    Format("rinex", "RINEX 3 or 4 observations: pseudoranges", (".rnx", ".obs"), _open_rinex_observation),
-    Format("rinex-nav", "RINEX 3 or 4 navigation: ephemerides", (".rnx", ".nav"), _open_rinex_navigation),
+    Format(
+        "rinex",
+        "RINEX 2, 3 or 4 observations, also compact (Hatanaka): pseudoranges",
+        (".rnx", ".obs", ".crx"),
+        _open_rinex_observation,
+    ),
+    Format("rinex-nav", "RINEX 2, 3 or 4 navigation: ephemerides", (".rnx", ".nav"), _open_rinex_navigation),
     Format("sp3", "SP3 precise orbits and clocks", (".sp3",), _open_sp3),
     Format("tum", "TUM trajectory, as a reference", (".tum", ".txt"), _open_tum),
 )
