@@ -28,6 +28,8 @@ from navreplay.timeline import LogError
 __all__ = ["FORMATS", "Format", "open_log"]
 
 _HEAD_BYTES = 20_000
+_FAR_BYTES = 4_000_000
+"""How far a stream is searched for its first message that is read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,7 +169,17 @@ def _open_rinex_navigation(path: str, head: bytes, settings: InputSettings) -> L
 
 
 def _open_ubx(path: str, head: bytes, settings: InputSettings) -> Log | None:
-    return UbxLog(path) if is_ubx(head) else None
+    if not is_ubx(head) and not _ubx_later(path, head):
+        return None
+    return UbxLog(path, leap_seconds(settings.leap_seconds), settings.utc_date)
+
+
+def _ubx_later(path: str, head: bytes) -> bool:
+    """Whether a stream that begins with other messages, of NMEA or UBX, holds some that are read further on."""
+    if b"\xb5\x62" not in head and not head.startswith(b"$"):
+        return False
+    with Path(path).open("rb") as file:
+        return is_ubx(file.read(_FAR_BYTES))
 
 
 def _open_sp3(path: str, head: bytes, settings: InputSettings) -> Log | None:
@@ -184,7 +196,7 @@ FORMATS: tuple[Format, ...] = (
     Format("mcap", "MCAP with ROS 2, ROS 1, Foxglove JSON or protobuf messages", (".mcap",), _open_mcap),
     Format("ros1", "ROS 1 bag", (".bag",), _open_ros1),
     Format("ros2", "ROS 2 bag: the folder, or its .db3 file", (".db3",), _open_ros2),
-    Format("ubx", "u-blox stream with raw measurements (RXM-RAWX, RXM-SFRBX)", (".ubx",), _open_ubx),
+    Format("ubx", "u-blox stream: RXM-RAWX, RXM-SFRBX, NAV-PVT, NAV-HPPOSLLH, ESF-RAW, ESF-MEAS ...", (".ubx",), _open_ubx),
     Format("csv", "any table of numbers, or matrix of a MATLAB file, by [[input.csv]]", (".csv", ".txt", ".mat"), _open_mapped),
     Format("navreplay", "this program's own CSV: imu, fix, trajectory, solution", (".csv",), _open_own),
     Format("smartphone", "Android raw measurements (device_gnss.csv)", (".csv",), _open_smartphone),
