@@ -121,10 +121,19 @@ def _read(logs: Sequence[Log], findings: list[Finding]) -> dict[tuple[int, str],
     for log in logs:
         names = tuple(dict.fromkeys(channel.name for channel in log.channels() if find_kind(channel.type) is not None))
         try:
-            tables |= {(id(log), name): table for name, table in (log.read(names) if names else {}).items()}
+            read = log.read(names) if names else {}
         except LogError as error:
             findings.append(Finding("error", "unreadable", f"{error}.", ""))
+            continue
+        tables |= {(id(log), name): table for name, table in read.items()}
+        findings += [_unreadable(log, name, table) for name, table in read.items() if table.read and not len(table.log_time_ns)]
     return tables
+
+
+def _unreadable(log: Log, name: str, table: Table) -> Finding:
+    why = ", ".join(f"{count} {reason}" for reason, count in table.rejected.items())
+    text = f"{log.path}: none of the {table.read} messages of channel {name} can be read ({why})."
+    return Finding("warning", "unreadable", text, "The other channels are read without it.")
 
 
 def _describe(

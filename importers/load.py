@@ -12,7 +12,7 @@ from importers.conversion.imu import convert_imu
 from importers.conversion.ranges import convert_ranges
 from importers.conversion.reference import convert_reference, reference_from_fixes
 from importers.formats import open_log
-from importers.roles.selection import Choice, choose_channels
+from importers.roles.selection import Choice, choose_channels, named_channel
 from importers.roles.sources import Clock, Source, join_sources
 from importers.rows.clock import leap_seconds
 from importers.rows.log import Log, Table
@@ -61,10 +61,7 @@ def build_timeline(
     logs: Sequence[Log], choices: Sequence[Choice], tables: dict[tuple[int, str], Table], settings: InputSettings
 ) -> Timeline:
     """The timeline of channels already read: tables by the log's identity and the channel's name. Raises LogError."""
-    sources: dict[str, list[Source]] = {}
-    for choice in choices:
-        table = tables[id(choice.log), choice.channel.name]
-        sources.setdefault(choice.role, []).append(Source(choice.log.path, choice.channel, table, choice.role))
+    sources, unreadable = _readable_sources(choices, tables, settings)
     clock = Clock(leap_seconds(settings.leap_seconds), tuple(source.table for source in sources.get("time", [])))
     uses: list[ChannelUse] = [_time_use(source) for source in sources.get("time", [])]
     notes: list[str] = []
@@ -93,7 +90,7 @@ def build_timeline(
         trajectory = reference_from_fixes(fixes, settings.reference)
         notes.append("the fixes themselves, before any is withheld, serve as the reference: not an independent one")
     files = tuple(describe_file(log) for log in {log.path: log for log in logs}.values())
-    damage = tuple(f"{log.path}: {note}" for log in logs for note in log.notes)
+    damage = (*(f"{log.path}: {note}" for log in logs for note in log.notes), *unreadable)
     provenance = Provenance(files, _complete(logs, uses), tuple(dict.fromkeys(notes)), damage, tuple(recognised.items()))
     return Timeline(
         imu=imu,
@@ -108,6 +105,27 @@ def build_timeline(
 
 
 _GNSS = ("fix", "velocity")
+_INDISPENSABLE = ("imu", "fix")
+
+
+def _readable_sources(
+    choices: Sequence[Choice], tables: dict[tuple[int, str], Table], settings: InputSettings
+) -> tuple[dict[str, list[Source]], list[str]]:
+    """Sources by role, and sentences on channels left out: of a role that no setting names and that a drive can do without,
+    one whose messages cannot be read costs nothing but itself."""
+    sources: dict[str, list[Source]] = {}
+    told = []
+    for choice in choices:
+        table, channel = tables[id(choice.log), choice.channel.name], choice.channel
+        lost = table.read > 0 and len(table.log_time_ns) == 0
+        if lost and choice.role not in _INDISPENSABLE and named_channel(settings, choice.role) is None:
+            why = ", ".join(table.rejected)
+            told.append(
+                f"{choice.log.path}: channel {channel.name} is not used: none of its {table.read} messages is readable: {why}"
+            )
+        else:
+            sources.setdefault(choice.role, []).append(Source(choice.log.path, channel, table, choice.role))
+    return sources, told
 
 
 def _ranges(

@@ -57,7 +57,7 @@ class McapLog:
         require_channels(self.path, names, self.channels())
         numbers = self._numbers()
         wanted = {name: numbers[name] for name in names}
-        return read_tables(self.path, wanted, self._decoder, self._messages, self._directory.counts)
+        return read_tables(wanted, self._decoder, self._messages, self._directory.counts)
 
     def _numbers(self) -> dict[str, list[int]]:
         numbers: dict[str, list[int]] = {}

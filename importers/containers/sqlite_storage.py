@@ -53,7 +53,7 @@ class SqliteStorage:
         """See `Log`."""
         require_channels(self.path, names, self.channels())
         numbers = {name: self._numbers(name) for name in names}
-        return read_tables(self.path, numbers, self._decoder, self._messages, self._counts)
+        return read_tables(numbers, self._decoder, self._messages, self._counts)
 
     def _whole_pages(self, content: Buffer) -> Path:
         """The file, or a copy without its last page where that was cut: SQLite would take what is missing for zeros."""

@@ -33,7 +33,11 @@ def convert_imu(
     """The series, its accounting, what was assumed, and the settings recognised. Raises LogError where no sample is usable."""
     rows = joined.rows
     if rows.gyro is None or rows.accel is None:
-        raise LogError(f"{joined.name}: has no angular rates or no specific forces, so it cannot serve as IMU")
+        what, key = ("angular rates", "channel") if rows.gyro is None else ("accelerations", "accel_channel")
+        raise LogError(
+            f"{joined.name}: holds no {what} (zero throughout, or said to be missing by a first covariance element of -1), so "
+            f"it cannot serve as IMU; where another channel holds them, name that one with input.imu.{key}"
+        )
     screening = Screening(joined.name, len(joined.t_ns))
     samples = np.concatenate([rows.gyro, rows.accel], axis=1)
     screening.reject(~np.isfinite(samples).all(axis=1), "not finite")

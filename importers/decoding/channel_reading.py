@@ -3,7 +3,9 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from difflib import get_close_matches
 
-from importers.decoding.blocks import Block, Decoder, Loss, TableBuilder, collect
+import numpy as np
+
+from importers.decoding.blocks import Block, Buffer, Decoded, Decoder, Loss, Offsets, TableBuilder, collect
 from importers.rows.log import Channel, Table
 from navreplay.timeline import LogError
 
@@ -23,7 +25,6 @@ def require_channels(path: str, names: Sequence[str], channels: Sequence[Channel
 
 
 def read_tables(
-    path: str,
     numbers: Mapping[str, Sequence[int]],
     decoder: Callable[[int], Decoder],
     messages: Callable[[set[int]], Iterable[Block | Loss]],
@@ -31,17 +32,12 @@ def read_tables(
 ) -> dict[str, Table]:
     """Tables by name, in one pass.
 
-    numbers: the container's channel numbers under each name. decoder: makes the decoder of a number; its LogError is told
-    with file and channel. messages: yields the blocks of the numbers given. counts: messages that the file's index promises
-    per number; those that did not turn up are rejected as lost to damage.
+    numbers: the container's channel numbers under each name. decoder: makes the decoder of a number; where it raises LogError,
+    the messages of that number are rejected for what the error says, and no other channel loses anything. messages: yields
+    the blocks of the numbers given. counts: messages that the file's index promises per number; those that did not turn up
+    are rejected as lost to damage.
     """
-    decoders: dict[int, Decoder] = {}
-    for name, members in numbers.items():
-        for number in members:
-            try:
-                decoders[number] = decoder(number)
-            except LogError as error:
-                raise LogError(f"{path}: channel {name}: {error}") from error
+    decoders = {number: _decoder_or_refusal(decoder, number) for members in numbers.values() for number in members}
     promised = {name: sum((counts or {}).get(number, 0) for number in members) for name, members in numbers.items()}
     by_name = {name: TableBuilder(promised[name]) for name in numbers}
     builders = {number: by_name[name] for name, members in numbers.items() for number in members}
@@ -49,3 +45,21 @@ def read_tables(
     for name, builder in by_name.items():
         builder.lose(promised[name] - builder.read, "lost to damage in the file")
     return {name: builder.table() for name, builder in by_name.items()}
+
+
+class _Refusal:
+    """In place of a decoder that cannot be made: rejects every message for the same reason."""
+
+    def __init__(self, reason: str) -> None:
+        self._reason = reason
+
+    def decode(self, buffer: Buffer, start: Offsets, stop: Offsets) -> Decoded:
+        """See `Decoder`."""
+        return Decoded({}, np.empty(0, dtype=np.intp), self._reason)
+
+
+def _decoder_or_refusal(decoder: Callable[[int], Decoder], number: int) -> Decoder:
+    try:
+        return decoder(number)
+    except LogError as error:
+        return _Refusal(str(error))

@@ -4,26 +4,38 @@ Types are named without the ``/msg/`` of ROS 2. ROS conventions are those of REP
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from importers.roles.ephemeris_messages import EPHEMERIS_TYPES
+from importers.roles.message_fields import covariances, numbers, numbers_of, vectors
 from importers.roles.range_messages import RANGE_TYPES
 from importers.roles.receiver_types import RECEIVER_TYPES
 from importers.rows.log import Table
-from importers.rows.tables import NO_FIX, Rows
+from importers.rows.tables import NO_FIX, Rows, diagonal_covariance
 from importers.text.nmea import NMEA_NOTE
 from navreplay.geodesy.rotation import scalar_first_from_last
+from navreplay.options import FilterOptions
 from navreplay.timeline import FixStatus, Floats, LogError
 
 __all__ = ["KINDS", "Kind", "find_kind", "stamp_column"]
 
-_NED_OF_ENU = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+_EAST_NORTH = [1, 0, 2]
+_UP_SIGNS = np.outer([1.0, 1.0, -1.0], [1.0, 1.0, -1.0])
 _RTK_FIXED_STD = 0.1
 _RTK_FLOAT_STD = 1.0
 _APPROXIMATE = (1, 2)
 """Covariance types of which only the diagonal is meant."""
+_COVARIANCE_TYPES = {"UNKNOWN": 0, "APPROXIMATED": 1, "DIAGONAL_KNOWN": 2, "KNOWN": 3}
+_GPS_STATUS = {
+    -1: NO_FIX, 0: FixStatus.SINGLE, 1: FixStatus.DIFFERENTIAL, 18: FixStatus.DIFFERENTIAL, 19: FixStatus.FIXED,
+    20: FixStatus.FLOAT, 33: FixStatus.DIFFERENTIAL,
+}  # fmt: skip
+"""Of gps_msgs/GPSStatus; 2 (ground-based augmentation) is judged by the accuracy told."""
+_STDS_OF_95_PERCENT = 2.0
+_CLIMB_STD = 100.0
+_LATEST_NS = 9.2e18
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,18 +58,28 @@ def find_kind(type: str) -> Kind | None:
 
 def stamp_column(table: Table) -> np.ndarray | None:
     """Stamps in nanoseconds since 1970 within the messages, None where the type has none."""
-    return next((table.columns[name] for name in ("header.stamp", "timestamp", "stamp") if name in table.columns), None)
+    columns = (table.columns.get(name) for name in ("header.stamp", "timestamp", "stamp"))
+    column = next((column for column in columns if column is not None), None)
+    if column is None or column.dtype.kind in "iu":
+        return column
+    stamps = numbers_of(column)
+    return np.where(np.abs(stamps) < _LATEST_NS, np.nan_to_num(stamps), 0.0).astype(np.int64)
+
+
+def _count(columns: Mapping[str, np.ndarray]) -> int:
+    return len(next(iter(columns.values()), ()))
 
 
 def _imu(columns: Mapping[str, np.ndarray]) -> Rows:
+    n = _count(columns)
     has_orientation = "orientation" in columns and "orientation_covariance" in columns
-    cov = columns["orientation_covariance"].astype(np.float64).reshape(-1, 3, 3) if has_orientation else None
+    cov = covariances(columns, "orientation_covariance", 3, n) if has_orientation else None
     return Rows(
-        gyro=columns["angular_velocity"].astype(np.float64),
-        accel=columns["linear_acceleration"].astype(np.float64),
+        gyro=_unless_absent(columns, "angular_velocity", n),
+        accel=_unless_absent(columns, "linear_acceleration", n),
         sensor_axes="flu",
         units_known=False,
-        q=scalar_first_from_last(columns["orientation"]) if has_orientation else None,
+        q=scalar_first_from_last(vectors(columns, "orientation", 4, n)) if has_orientation else None,
         ros_attitude=True,
         cov_att=cov,
         # a first element of -1 says that there is none
@@ -65,8 +87,21 @@ def _imu(columns: Mapping[str, np.ndarray]) -> Rows:
     )
 
 
+def _unless_absent(columns: Mapping[str, np.ndarray], name: str, n: int) -> Floats | None:
+    """Vectors (n, 3); None where the messages say that they have none (a first covariance element of -1) and never hold
+    anything but one value, or hold nothing but zeros, which no inertial sensor does."""
+    if name not in columns:
+        raise KeyError(name)
+    values = vectors(columns, name, 3, n)
+    told = covariances(columns, f"{name}_covariance", 3, n)[:, 0, 0]
+    constant = n > 1 and not np.any(values[1:] != values[0])
+    absent = constant and (bool((told == -1).all()) or not np.any(values))
+    return None if absent else values
+
+
 def _own_imu(columns: Mapping[str, np.ndarray]) -> Rows:
-    return Rows(gyro=columns["angular_velocity"].astype(float), accel=columns["linear_acceleration"].astype(float))
+    n = _count(columns)
+    return Rows(gyro=vectors(columns, "angular_velocity", 3, n), accel=vectors(columns, "linear_acceleration", 3, n))
 
 
 def _nav_sat_fix(columns: Mapping[str, np.ndarray]) -> Rows:
@@ -79,64 +114,99 @@ def _nav_sat_fix(columns: Mapping[str, np.ndarray]) -> Rows:
 
 def _gps_fix(columns: Mapping[str, np.ndarray]) -> Rows:
     rows = _nav_sat_fix(columns)
-    course = np.radians(columns["track"].astype(np.float64))
-    speed, climb = columns["speed"].astype(np.float64), columns["climb"].astype(np.float64)
-    vel = np.column_stack([speed * np.cos(course), speed * np.sin(course), -climb])
-    return Rows(lla=rows.lla, cov_pos=rows.cov_pos, status=rows.status, vel=vel)
+    n = _count(columns)
+    if "status.status" in columns:
+        code = columns["status.status"].astype(np.int64)
+        meant = np.array([_GPS_STATUS.get(value, FixStatus.UNKNOWN) for value in code.tolist()], dtype=np.int8)
+        rows = replace(rows, status=np.where(code == 2, rows.status, meant))
+    vel, cov_vel = _track_velocity(columns, n)
+    return replace(rows, vel=vel, cov_vel=cov_vel)
+
+
+def _track_velocity(columns: Mapping[str, np.ndarray], n: int) -> tuple[Floats, Floats | None]:
+    """Velocities NED (n, 3) of speed, track [deg] and climb, and their covariances (None: unknown). What a driver never fills
+    stays 0 throughout, without an error told: such a speed is unknown, such a climb too uncertain to count."""
+    speed, climb = numbers(columns, "speed", n), numbers(columns, "climb", n)
+    track = np.where(speed == 0, np.nan_to_num(numbers(columns, "track", n)), numbers(columns, "track", n))
+    if not np.any(np.nan_to_num(speed)) and not np.any(np.nan_to_num(track)) and not _told(columns, "err_speed", n):
+        return np.full((n, 3), np.nan), None
+    no_climb = ~np.isfinite(climb)
+    if not np.any(np.nan_to_num(climb)) and not _told(columns, "err_climb", n):
+        no_climb[:] = True
+    course = np.radians(track)
+    vel = np.column_stack([speed * np.cos(course), speed * np.sin(course), -np.where(no_climb, 0.0, climb)])
+    if not no_climb.any():
+        return vel, None
+    std = numbers(columns, "err_speed", n) / _STDS_OF_95_PERCENT
+    std = np.where(std > 0, std, FilterOptions().default_velocity_std[0])
+    return vel, diagonal_covariance(np.column_stack([std, std, np.where(no_climb, _CLIMB_STD, std)]))
+
+
+def _told(columns: Mapping[str, np.ndarray], name: str, n: int) -> bool:
+    return bool(np.any(np.nan_to_num(numbers(columns, name, n)) > 0))
 
 
 def _geodetic(columns: Mapping[str, np.ndarray]) -> Floats:
-    lla = np.column_stack([columns["latitude"], columns["longitude"], columns["altitude"]]).astype(np.float64)
+    n = len(columns["latitude"])
+    lla = np.column_stack([numbers_of(columns["latitude"]), numbers_of(columns["longitude"]), numbers(columns, "altitude", n)])
     return np.asarray(lla * [np.pi / 180, np.pi / 180, 1.0])
 
 
 def _position_covariance(columns: Mapping[str, np.ndarray]) -> Floats:
-    """NED covariances (n, 3, 3) of ENU ones, all NaN where their type says unknown."""
-    cov = columns["position_covariance"].astype(np.float64).reshape(-1, 3, 3)
-    kind = columns.get("position_covariance_type", np.full(len(cov), 3)).astype(np.int64)
+    """NED covariances (n, 3, 3) of ENU ones, all NaN where their type says unknown or there is none."""
+    n = len(columns["latitude"])
+    cov = covariances(columns, "position_covariance", 3, n)
+    kind = columns.get("position_covariance_type", np.full(n, 3))
+    if kind.dtype == object:
+        kind = np.array([_COVARIANCE_TYPES.get(value, value) for value in kind.tolist()], dtype=object)
+    kind = np.nan_to_num(numbers_of(kind)).astype(np.int64)
     diagonal = np.isin(kind, _APPROXIMATE)
-    cov = np.where(diagonal[:, None, None], cov * np.eye(3), cov)
-    cov = _NED_OF_ENU @ cov @ _NED_OF_ENU.T
+    cov = np.where(diagonal[:, None, None] & ~np.eye(3, dtype=bool), 0.0, cov)
+    cov = cov[:, _EAST_NORTH][:, :, _EAST_NORTH] * _UP_SIGNS + 0.0  # by place: an unknown element stays alone; no -0
     cov[kind == 0] = np.nan
     return np.asarray(cov)
 
 
 def _satellite_status(code: np.ndarray, cov: Floats) -> np.ndarray:
     """FixStatus of NavSatStatus. A ground-based augmentation (2) is how drivers tell carrier-phase solutions; the standard
-    deviation separates fixed from float from code-differential."""
+    deviation separates fixed from float from code-differential. -2 is unknown (since ROS 2 Jazzy), as is any other code."""
     std = np.sqrt(np.maximum(cov[:, 0, 0], cov[:, 1, 1]), where=cov[:, 0, 0] >= 0, out=np.full(len(cov), np.inf))
     ground = np.where(std <= _RTK_FIXED_STD, FixStatus.FIXED, np.where(std <= _RTK_FLOAT_STD, FixStatus.FLOAT, 2))
-    status = np.where(code == 2, ground, np.where(code > 0, FixStatus.DIFFERENTIAL, FixStatus.SINGLE))
-    return np.where(code < 0, NO_FIX, status).astype(np.int8)
+    known = [code == -1, code == 0, code == 1, code == 2]
+    return np.select(known, [NO_FIX, FixStatus.SINGLE, FixStatus.DIFFERENTIAL, ground], FixStatus.UNKNOWN).astype(np.int8)
 
 
 def _twist(prefix: str) -> Callable[[Mapping[str, np.ndarray]], Rows]:
     def rows(columns: Mapping[str, np.ndarray]) -> Rows:
         """Velocities and, where the message has them, their covariances."""
-        cov = columns.get("twist.covariance")
-        cov_vel = None if cov is None else cov.astype(np.float64).reshape(-1, 6, 6)[:, :3, :3]
-        return Rows(vel=columns[prefix + "linear"].astype(np.float64), vel_frame="auto", cov_vel=cov_vel)
+        n = _count(columns)
+        if prefix + "linear" not in columns:
+            raise KeyError(prefix + "linear")
+        cov_vel = covariances(columns, "twist.covariance", 6, n)[:, :3, :3] if "twist.covariance" in columns else None
+        return Rows(vel=vectors(columns, prefix + "linear", 3, n), vel_frame="auto", cov_vel=cov_vel)
 
     return rows
 
 
 def _own_velocity(columns: Mapping[str, np.ndarray]) -> Rows:
-    return Rows(vel=columns["velocity"].astype(np.float64))
+    return Rows(vel=vectors(columns, "velocity", 3, _count(columns)))
 
 
 def _pose(prefix: str) -> Callable[[Mapping[str, np.ndarray]], Rows]:
     def rows(columns: Mapping[str, np.ndarray]) -> Rows:
         """Local positions and attitudes."""
-        q = scalar_first_from_last(columns[prefix + "orientation"])
-        cov = columns.get("pose.covariance")
-        cov_att = None if cov is None else cov.astype(np.float64).reshape(-1, 6, 6)[:, 3:, 3:]
-        return Rows(local=columns[prefix + "position"].astype(np.float64), q=q, ros_attitude=True, cov_att=cov_att)
+        n = _count(columns)
+        if prefix + "position" not in columns:
+            raise KeyError(prefix + "position")
+        q = scalar_first_from_last(vectors(columns, prefix + "orientation", 4, n))
+        cov_att = covariances(columns, "pose.covariance", 6, n)[:, 3:, 3:] if "pose.covariance" in columns else None
+        return Rows(local=vectors(columns, prefix + "position", 3, n), q=q, ros_attitude=True, cov_att=cov_att)
 
     return rows
 
 
 def _quaternion(columns: Mapping[str, np.ndarray]) -> Rows:
-    return Rows(q=scalar_first_from_last(columns["quaternion"]), ros_attitude=True)
+    return Rows(q=scalar_first_from_last(vectors(columns, "quaternion", 4, _count(columns))), ros_attitude=True)
 
 
 def _no_rows(columns: Mapping[str, np.ndarray]) -> Rows:

@@ -9,7 +9,7 @@ from importers.rows.log import Channel, Log
 from importers.settings import InputSettings
 from navreplay.timeline import LogError
 
-__all__ = ["NOTHING", "SETTING", "Choice", "always_used", "candidates", "choose_channels", "choose_role"]
+__all__ = ["NOTHING", "SETTING", "Choice", "always_used", "candidates", "choose_channels", "choose_role", "named_channel"]
 
 SETTING = {
     "imu": "input.imu.channel",
@@ -51,6 +51,18 @@ def choose_channels(logs: Sequence[Log], settings: InputSettings, reference: Log
     return (*chosen, *always_used(logs))
 
 
+def named_channel(settings: InputSettings, role: str) -> str | None:
+    """The channel that the settings name for a role; None where they name none, or the role needs no choice."""
+    return {
+        "imu": settings.imu.channel,
+        "fix": settings.fix.channel,
+        "velocity": settings.fix.velocity_channel,
+        "range": settings.range.channel,
+        "attitude": settings.attitude.channel,
+        "reference": settings.reference.channel,
+    }.get(role)
+
+
 def always_used(logs: Sequence[Log]) -> list[Choice]:
     """Channels that serve others and need no choice: time references, and ephemerides."""
     return [*candidates(logs, "time"), *candidates(logs, "ephemeris")]
@@ -60,13 +72,7 @@ def choose_role(logs: Sequence[Log], settings: InputSettings, reference: Log | N
     """The channels of one role: one, or its continuations from file to file, or none. Raises LogError as `choose_channels`."""
     if role == "reference":
         return [] if settings.reference.from_fixes else _choose_reference(logs, settings.reference.channel, reference)
-    name = {
-        "imu": settings.imu.channel,
-        "fix": settings.fix.channel,
-        "velocity": settings.fix.velocity_channel,
-        "range": settings.range.channel,
-        "attitude": settings.attitude.channel,
-    }[role]
+    name = named_channel(settings, role)
     if name == NOTHING:
         return []
     if name is not None:

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from importers.roles.heights import fill_unknown_heights
+from importers.roles.message_fields import either_spelling
 from importers.roles.messages import find_kind, stamp_column
 from importers.rows.clock import gps_from_stamps
 from importers.rows.log import Channel, Table
@@ -65,7 +67,10 @@ def join_sources(
             raise LogError(
                 f"{source.file}: channel {source.channel.name} of type {source.channel.type} cannot serve as {source.role}"
             )
-        rows.append(_extract(source))
+        extracted, told = fill_unknown_heights(_extract(source))
+        rows.append(extracted)
+        if told:
+            notes.append(f"{source.channel.name}: {told}")
         if kind.note:
             notes.append(f"{source.channel.name}: {kind.note}")
     ends = np.cumsum([len(times) for times, _ in timed])
@@ -94,7 +99,7 @@ def _extract(source: Source) -> Rows:
     kind = find_kind(source.channel.type)
     assert kind is not None
     try:
-        return kind.rows(source.table.columns)
+        return kind.rows(either_spelling(source.table.columns))
     except KeyError as error:
         if len(source.table.log_time_ns) == 0:
             raise _nothing_readable(source) from error
@@ -106,20 +111,33 @@ def _extract(source: Source) -> Rows:
 def _nothing_readable(source: Source) -> LogError:
     lost = ", ".join(f"{count} {reason}" for reason, count in source.table.rejected.items())
     of = f" of {source.table.read} ({lost})" if lost else ""
-    return LogError(
-        f"{source.file}: channel {source.channel.name} holds no readable message{of}; copy the file again, or leave it out"
-    )
+    return LogError(f"{source.file}: channel {source.channel.name} holds no readable message{of}; {_LEAVE_OUT}")
+
+
+_LEAVE_OUT = "name another channel, or leave it out (the setting that names the channel, set to 'none')"
 
 
 def _concatenate(rows: Sequence[Rows]) -> Rows:
+    """Rows end to end; a field that some of the parts lack is unknown there."""
     if len(rows) == 1:
         return rows[0]
+    lengths = [_length(part) for part in rows]
     arrays: dict[str, Any] = {}
     for field in fields(Rows):
         values = [getattr(part, field.name) for part in rows]
-        if all(isinstance(value, np.ndarray) for value in values):
-            arrays[field.name] = np.concatenate(values)
+        known = next((value for value in values if isinstance(value, np.ndarray)), None)
+        if known is not None:
+            parts = [_unknown(known, n) if value is None else value for value, n in zip(values, lengths, strict=True)]
+            arrays[field.name] = np.concatenate(parts)
     return replace(rows[0], **arrays)
+
+
+def _length(rows: Rows) -> int:
+    return max((len(value) for field in fields(Rows) if isinstance(value := getattr(rows, field.name), np.ndarray)), default=0)
+
+
+def _unknown(like: np.ndarray, n: int) -> np.ndarray:
+    return np.full((n, *like.shape[1:]), np.nan if like.dtype.kind == "f" else 0, like.dtype)
 
 
 def _times(
