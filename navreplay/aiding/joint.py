@@ -11,6 +11,7 @@ from navreplay.timeline import Floats, Times
 from navreplay.update.gaussian import Innovation
 from navreplay.update.measurement import join
 from navreplay.update.record import Recorder
+from navreplay.update.reopening import Widening
 from navreplay.update.verdict import EpochGate, Verdict
 
 __all__ = ["JointAiding", "JointGate", "JointVerdict"]
@@ -60,14 +61,9 @@ class JointVerdict(NamedTuple):
         return np.concatenate([rows[verdict.passed] for verdict, rows in zip(self.verdicts, self.rows, strict=True)])
 
     @property
-    def inflation(self) -> float:
-        """The largest factor on the prior covariance."""
-        return max(verdict.inflation for verdict in self.verdicts)
-
-    @property
-    def run(self) -> int:
-        """Rejected epochs in a row, of the part that has most of them."""
-        return max(verdict.run for verdict in self.verdicts)
+    def widenings(self) -> tuple[Widening, ...]:
+        """Those of all parts."""
+        return tuple(widening for verdict in self.verdicts for widening in verdict.widenings)
 
     def record(self, recorder: Recorder, t_ns: int, kinds: tuple[str, ...], innovation: Innovation, noise: Floats) -> None:
         """Puts the components into the record with the verdicts on them."""

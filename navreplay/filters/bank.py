@@ -20,7 +20,7 @@ from navreplay.error_models.error_model import ErrorModel
 from navreplay.error_models.ned import Propagated
 from navreplay.filters import _bank_kernel
 from navreplay.filters.presets import Method
-from navreplay.filters.update import Updated, tell_inflation
+from navreplay.filters.update import Updated
 from navreplay.filters.weights import Mmae
 from navreplay.mechanisation.strapdown import Leg, NavState
 from navreplay.solution import RowStatus
@@ -29,6 +29,7 @@ from navreplay.update.adapter import adapt_measured, is_measured
 from navreplay.update.gaussian import Gaussian, Leftover, symmetric
 from navreplay.update.measurement import Measurement
 from navreplay.update.record import Recorder
+from navreplay.update.reopening import LossWatch, tell_widening, widen
 from navreplay.update.verdict import EpochGate
 
 __all__ = ["Bank", "Stack", "Update", "mix", "move_stack", "update_stack"]
@@ -108,6 +109,7 @@ class Bank:
         self._mixed: Floats | None = None
         self._leader = ""
         self._zero = np.zeros(model.size)
+        self._watch = LossWatch()
 
     def propagate(self, state: NavState, cov: Floats, leg: Leg) -> Propagated:
         """From state and the mixture's cov (n, n) to the nodes of a leg, where covariances are the mixture's."""
@@ -134,15 +136,17 @@ class Bank:
         prior, noises = self._adapt(t_ns, measurement)
         mixture = Gaussian(self._zero, cov) if prior is self._stack else mix(prior, self._weights.values)
         noise = _average(self._weights.values, noises)
-        innovation = self._method.rule.innovate(mixture, measurement)
+        innovation = self._method.rule.innovate(mixture, measurement)._replace(t_ns=t_ns)
         verdict = self._gate.judge(measurement.kinds, innovation, noise)
-        if verdict.inflation > 1:
-            prior = prior._replace(covs=prior.covs * verdict.inflation)
+        if verdict.widenings:
+            prior = prior._replace(covs=widen(prior.covs, self._model.names, verdict.widenings))
             mixture = mix(prior, self._weights.values)
-            innovation = self._method.rule.innovate(mixture, measurement)
-            tell_inflation(self._recorder, t_ns, self._aiding, verdict)
+            innovation = self._method.rule.innovate(mixture, measurement)._replace(t_ns=t_ns)
+            for widening in verdict.widenings:
+                tell_widening(self._recorder, t_ns, widening)
             if not len(verdict.passed):
                 verdict = self._gate.judge(measurement.kinds, innovation, noise)
+        lost = self._watch.lost(t_ns, verdict.widenings)
         verdict.record(self._recorder, t_ns, measurement.kinds, innovation, noise)
         if not len(verdict.passed):
             self._leave(t_ns, innovation.labels, measurement, self._stack.means)
@@ -153,7 +157,7 @@ class Bank:
         self._stack = stack._replace(means=stack.means - posterior.mean)
         moved = self._model.retract(state, posterior.mean)
         self._mixed = symmetric(posterior.cov)
-        return Updated(moved, self._mixed, state, mixture.cov, RowStatus.UPDATED, observed)
+        return Updated(moved, self._mixed, state, mixture.cov, RowStatus.UPDATED, observed, lost)
 
     def _condition(self, t_ns: int, prior: Stack, measurement: Measurement, noises: Floats, passed: np.ndarray) -> Stack:
         """The hypotheses given the components with index passed (k,), and weighed by those of them that a sensor has measured:

@@ -52,6 +52,12 @@ class Rows:
             self.forward.prior_states[row] = updated.prior_state.pack()
             self.forward.prior_covariances[row] = updated.prior_cov
 
+    def until(self, row: int) -> "Rows":
+        """The rows up to that one."""
+        kept = slice(0, row + 1)
+        forward = None if self.forward is None else ForwardPass(*(part[kept] for part in self.forward))
+        return Rows(self.t_ns[kept], self.states[kept], self.covariances[kept], self.status[kept], forward)
+
     def smoothed(self, model: ErrorModel) -> "Rows":
         """The rows given all measurements; the smoother's needs are dropped. Rows stay as they are where none were kept."""
         if self.forward is None:

@@ -15,14 +15,15 @@ from navreplay.update.adapter import adapt_measured
 from navreplay.update.gaussian import Gaussian, Leftover
 from navreplay.update.measurement import Measurement
 from navreplay.update.record import Recorder
-from navreplay.update.verdict import EpochGate, Verdict
+from navreplay.update.reopening import LossWatch, tell_widening, widen
+from navreplay.update.verdict import EpochGate
 
-__all__ = ["Estimator", "Updated", "Updater", "tell_inflation"]
+__all__ = ["Estimator", "Updated", "Updater"]
 
 
 class Updated(NamedTuple):
     """An epoch's outcome: state and cov (n, n), what they were before the measurement (clock jumps and inflation included),
-    what became of it, and what was observed."""
+    what became of it, and what was observed. lost: the filter has lost its way."""
 
     state: NavState
     cov: Floats
@@ -30,6 +31,7 @@ class Updated(NamedTuple):
     prior_cov: Floats
     status: RowStatus
     observed: Observed
+    lost: bool = False
 
 
 class Estimator(Protocol):
@@ -44,12 +46,6 @@ class Estimator(Protocol):
         ...
 
 
-def tell_inflation(recorder: Recorder, t_ns: int, aiding: Aiding, verdict: Verdict) -> None:
-    """Records that a gate was reopened."""
-    text = f"{aiding.name} were rejected {verdict.run} epochs in a row; covariance times {verdict.inflation:.1f}"
-    recorder.tell(t_ns, "warning", text)
-
-
 class Updater:
     """The single filter, with one kind of aiding. Keeps the state of the adapter, the gate, and the record."""
 
@@ -62,6 +58,7 @@ class Updater:
         self._adapter_state: Any = method.adapter.init()
         self._leftover: Leftover | None = None
         self._zero = np.zeros(model.size)
+        self._watch = LossWatch()
 
     def propagate(self, state: NavState, cov: Floats, leg: Leg) -> Propagated:
         """From state and cov (n, n) to the nodes of a leg, by the moment rule."""
@@ -80,14 +77,16 @@ class Updater:
         labels = innovation.labels
         adapted, noise, self._adapter_state = adapt_measured(adapter, self._adapter_state, prior, innovation)
         if adapted is not prior:
-            innovation = rule.innovate(adapted, measurement)
+            innovation = rule.innovate(adapted, measurement)._replace(t_ns=t_ns)
         verdict = self._gate.judge(measurement.kinds, innovation, noise)
-        if verdict.inflation > 1:
-            adapted = Gaussian(self._zero, adapted.cov * verdict.inflation)
-            innovation = rule.innovate(adapted, measurement)
-            tell_inflation(self._recorder, t_ns, self._aiding, verdict)
+        if verdict.widenings:
+            adapted = Gaussian(self._zero, widen(adapted.cov, self._model.names, verdict.widenings))
+            innovation = rule.innovate(adapted, measurement)._replace(t_ns=t_ns)
+            for widening in verdict.widenings:
+                tell_widening(self._recorder, t_ns, widening)
             if not len(verdict.passed):
                 verdict = self._gate.judge(measurement.kinds, innovation, noise)
+        lost = self._watch.lost(t_ns, verdict.widenings)
         verdict.record(self._recorder, t_ns, measurement.kinds, innovation, noise)
         if not len(verdict.passed):
             self._leave(t_ns, labels, measurement.residual)
@@ -98,7 +97,7 @@ class Updater:
         posterior = rule.condition(adapted, innovation, noise)
         self._leave(t_ns, labels, measurement.residual - measurement.jacobian @ posterior.mean)
         moved = self._model.retract(state, posterior.mean)
-        return Updated(moved, posterior.cov, state, adapted.cov, RowStatus.UPDATED, observed)
+        return Updated(moved, posterior.cov, state, adapted.cov, RowStatus.UPDATED, observed, lost)
 
     def _prior_covariance(self, cov: Floats, measurement: Measurement) -> Floats:
         """What an epoch starts from, of the propagated cov (n, n)."""

@@ -10,6 +10,9 @@ from navreplay.timeline import Floats, LogError
 
 __all__ = ["Gaussian", "Innovation", "Leftover", "chi_square", "condition", "kalman_gain", "solve", "symmetric"]
 
+_FLOOR = 1e-12
+"""Of the eigenvalues of a covariance against the largest: what double precision leaves of it."""
+
 
 class Gaussian(NamedTuple):
     """mean (n,) and covariance cov (n, n) of the error state."""
@@ -86,13 +89,20 @@ def chi_square(residual: Floats, cov: Floats) -> float:
 def solve(cov: Floats, right: Floats) -> Floats:
     """cov^-1 right by Cholesky, of the covariance (m, m) of an innovation and right (m, ...).
 
-    The bare LAPACK call, whose wrappers would cost ten times the work at these sizes. Raises LogError where cov is not
-    positive definite.
+    The bare LAPACK call, whose wrappers would cost ten times the work at these sizes. Where rounding has taken definiteness
+    from a finite cov, its eigenvalues are kept above a floor. Raises LogError where cov is not finite.
     """
     _, solution, info = dposv(cov, right, lower=True)
-    if info != 0:
+    return np.asarray(solution) if info == 0 else _solve_floored(cov, right)
+
+
+def _solve_floored(cov: Floats, right: Floats) -> Floats:
+    if not np.isfinite(cov).all():
         raise LogError(
-            "filter: the covariance of an innovation is not positive definite; are the standard deviations told plausible "
-            "(neither zero nor beyond all bounds)?"
+            "filter: the covariance of an innovation is not finite; are the standard deviations told plausible (neither zero "
+            "nor beyond all bounds)?"
         )
-    return np.asarray(solution)
+    values, axes = np.linalg.eigh(symmetric(cov))
+    floored = np.maximum(values, _FLOOR * max(float(np.abs(values).max()), np.finfo(float).tiny))
+    turned = axes.T @ right
+    return np.asarray(axes @ (turned.T / floored).T)

@@ -15,18 +15,18 @@ from navreplay.options import GateOptions
 from navreplay.timeline import Floats
 from navreplay.update.gaussian import Innovation, solve
 from navreplay.update.record import JudgedRows, Recorder
+from navreplay.update.reopening import Widening
 
 __all__ = ["RangeGate", "RangeVerdict"]
 
 
 class RangeVerdict(NamedTuple):
-    """passed (k,): indices of the components to use. reasons (m,): empty where used. inflation: factor on the prior
-    covariance, above 1 (and then nothing passes) where it must be reopened after `run` epochs without agreement."""
+    """passed (k,): indices of the components to use. reasons (m,): empty where used. widenings: where the gate must be reopened
+    after epochs without agreement; then nothing passes before it is judged anew."""
 
     passed: np.ndarray
     reasons: tuple[str, ...]
-    inflation: float
-    run: int
+    widenings: tuple[Widening, ...]
 
     def record(self, recorder: Recorder, t_ns: int, kinds: Sequence[str], innovation: Innovation, noise: Floats) -> None:
         """Puts the components into the record with the verdict on each."""
@@ -54,6 +54,7 @@ class RangeGate:
         self._reset_after = options.reset_after
         self._limit = float(chdtri(1, 1 - options.probability)) if options.probability < 1 else float("inf")
         self._run = 0
+        self._start_ns = 0
 
     def judge(self, kinds: tuple[str, ...], innovation: Innovation, noise: Floats) -> RangeVerdict:
         """The verdict on an innovation with R = noise (m, m): pseudoranges first, then range rates."""
@@ -64,12 +65,17 @@ class RangeGate:
         )
         ranges = kinds.count("range")
         lost = ranges - int(passed[:ranges].sum())
-        self._run = self._run + 1 if 2 * lost > ranges else 0
-        if 0 < self._reset_after <= self._run:
-            run, self._run = self._run, 0
-            inflation = 2 * max(1.0, float(np.median(squares[:ranges])))
-            return RangeVerdict(np.empty(0, dtype=np.intp), reasons, inflation, run)
-        return RangeVerdict(np.flatnonzero(passed), reasons, 1.0, self._run)
+        if 2 * lost <= ranges:
+            self._run = 0
+            return RangeVerdict(np.flatnonzero(passed), reasons, ())
+        self._start_ns = self._start_ns if self._run else innovation.t_ns
+        self._run += 1
+        if not 0 < self._reset_after <= self._run:
+            return RangeVerdict(np.flatnonzero(passed), reasons, ())
+        seconds = (innovation.t_ns - self._start_ns) / 1e9
+        run, self._run = self._run, 0
+        variance = float(np.median(np.square(innovation.residual[:ranges])))
+        return RangeVerdict(np.empty(0, dtype=np.intp), reasons, (Widening("range", variance, run, seconds),))
 
 
 def _exclude(residual: Floats, cov: Floats, limit: float) -> tuple[Floats, np.ndarray]:

@@ -46,6 +46,12 @@ class JudgedRows:
     reasons: tuple[str, ...]
 
 
+def _step(innovation: Innovation) -> Floats:
+    """(m,) residual less that of the epoch before, NaN where it had none."""
+    before = {} if innovation.leftover is None else innovation.leftover.residual
+    return np.asarray(innovation.residual - [before.get(label, np.nan) for label in innovation.labels])
+
+
 @dataclass(slots=True)
 class Recorder:
     """Grows while a filter runs."""
@@ -104,6 +110,7 @@ class Recorder:
             nis=np.array([row.nis for row in rows]),
             used=np.array([not row.reason for row in rows]),
             reason=tuple(row.reason for row in rows),
+            step=np.array([_step(innovation) for innovation in innovations]),
         )
 
     def _series_of_rows(self, kind: str) -> InnovationSeries:

@@ -7,6 +7,7 @@ import numpy as np
 from navreplay.timeline import Floats
 from navreplay.update.gaussian import Innovation
 from navreplay.update.record import Recorder
+from navreplay.update.reopening import Widening
 
 __all__ = ["EpochGate", "Verdict"]
 
@@ -20,13 +21,8 @@ class Verdict(Protocol):
         ...
 
     @property
-    def inflation(self) -> float:
-        """Factor on the prior covariance, above 1 where the gate had to be reopened."""
-        ...
-
-    @property
-    def run(self) -> int:
-        """Rejected epochs in a row."""
+    def widenings(self) -> tuple[Widening, ...]:
+        """How the prior covariance must grow, where the gate had to be reopened."""
         ...
 
     def record(self, recorder: Recorder, t_ns: int, kinds: tuple[str, ...], innovation: Innovation, noise: Floats) -> None:

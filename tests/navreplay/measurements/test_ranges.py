@@ -161,7 +161,9 @@ def test_the_range_gate_reopens_after_a_run_of_disagreement():
     innovation, kinds = gate_problem({i: 100.0 * (-1) ** i for i in range(8)}, clock_std=1.0)
     gate = RangeGate(GateOptions(reset_after=3))
     verdicts = [gate.judge(kinds, innovation, np.eye(8)) for _ in range(3)]
-    assert [verdict.run for verdict in verdicts] == [1, 2, 3]
-    assert verdicts[2].inflation > 100
+    assert [len(verdict.widenings) for verdict in verdicts] == [0, 0, 1]
+    (widening,) = verdicts[2].widenings
+    assert (widening.kind, widening.run) == ("range", 3)
+    assert widening.variance == pytest.approx(np.median(np.square(innovation.residual)))
     assert len(verdicts[2].passed) == 0
-    assert gate.judge(kinds, innovation, np.eye(8)).run == 1
+    assert not gate.judge(kinds, innovation, np.eye(8)).widenings
