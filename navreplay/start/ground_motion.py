@@ -3,7 +3,7 @@
 import numpy as np
 
 from navreplay.geodesy import earth
-from navreplay.timeline import Floats, GnssFixSeries, ImuSeries, LogError
+from navreplay.timeline import Floats, GnssFixSeries, ImuSeries, LogError, Times
 
 __all__ = ["find_initial_standstill", "find_motion", "fix_velocity", "window_fit"]
 
@@ -14,28 +14,79 @@ _STILL_WINDOW_NS = 500_000_000
 _SHORTEST_STANDSTILL_NS = 2_000_000_000
 _SIGNIFICANT = 4.5
 """A way of so many standard deviations per axis is noise once in 25 000 fixes."""
+_LONGEST_CHORD_S = 10.0
+_LONGEST_STEP_S = 3.0
+_SLOW_SHARE = 0.5
+_TOLD_TOO_LARGE = 3.0
+_LEAST_SPEED = 0.2
 _UNKNOWN_POSITION_STD = 2.0
 _UNKNOWN_VELOCITY_STD = 0.2
 
 
 def fix_velocity(fixes: GnssFixSeries) -> Floats:
-    """(k, 3) NED [m/s]: the receiver's where known, else the way since the position before over its time; NaN where that is
-    older than 3 s or the way no longer than the noise of its ends."""
+    """(k, 3) NED [m/s]: the receiver's where known, else the way between positions around a fix over its time.
+
+    The way is taken over the shortest span, even on both sides and up to 10 s, in which it is longer than the noise of its ends
+    (told, or as the positions scatter, whichever is more); NaN where it never is. A chord has the direction of the arc's
+    middle, so turns do no harm.
+    """
     velocity = np.full((len(fixes), 3), np.nan)
     rows = np.flatnonzero(fixes.has_position)
-    dt = np.diff(fixes.t_ns[rows]) / 1e9
-    way = earth.ned_between(fixes.lla[rows[:-1]], fixes.lla[rows[1:]])
-    variance = np.trace(fixes.cov_pos[rows, :2, :2], axis1=1, axis2=2) / 2
-    variance = np.where(np.isfinite(variance), variance, _UNKNOWN_POSITION_STD**2)
-    good = (dt < 3) & (np.hypot(way[:, 0], way[:, 1]) > _SIGNIFICANT * np.sqrt(variance[1:] + variance[:-1]))
-    velocity[rows[1:][good]] = way[good] / dt[good, None]
+    if len(rows) >= 2:
+        velocity[rows] = _chords(fixes.t_ns[rows], fixes.lla[rows], _position_std(fixes, rows))
     return np.where(fixes.has_velocity[:, None], fixes.vel_n, velocity)
 
 
+def _chords(t_ns: Times, lla: Floats, std: Floats) -> Floats:
+    """(k, 3) velocities of positions with horizontal standard deviations std (k,) [m] per axis."""
+    k = len(t_ns)
+    velocity, known = np.full((k, 3), np.nan), np.zeros(k, dtype=np.bool_)
+    seconds = (t_ns - t_ns[0]) / 1e9
+    for reach in range(1, k):
+        first, last = np.maximum(np.arange(k) - reach, 0), np.minimum(np.arange(k) + reach, k - 1)
+        span = seconds[last] - seconds[first]
+        open_rows = ~known & (span <= (_LONGEST_CHORD_S if reach > 1 else 2 * _LONGEST_STEP_S))
+        if not open_rows.any():
+            break
+        first, last, span = first[open_rows], last[open_rows], span[open_rows]
+        way = earth.ned_between(lla[first], lla[last])
+        good = np.hypot(way[:, 0], way[:, 1]) > _SIGNIFICANT * np.hypot(std[first], std[last])
+        at = np.flatnonzero(open_rows)[good]
+        velocity[at], known[at] = way[good] / span[good, None], True
+    return velocity
+
+
+def _position_std(fixes: GnssFixSeries, rows: np.ndarray) -> Floats:
+    """(k,) horizontal noise of positions per axis [m]: as told, but no less than they scatter about smooth motion, by their
+    third differences, and no more than three times that."""
+    variance = np.trace(fixes.cov_pos[rows, :2, :2], axis1=1, axis2=2) / 2
+    told = np.sqrt(np.where(np.isfinite(variance), variance, _UNKNOWN_POSITION_STD**2))
+    if len(rows) < 12:
+        return told
+    place = earth.ned_between(np.broadcast_to(fixes.lla[rows[0]], (len(rows), 3)), fixes.lla[rows])
+    scatter = 1.4826 * np.median(np.abs(np.diff(place[:, :2], 3, axis=0))) / np.sqrt(20.0)
+    return np.clip(told, scatter, _TOLD_TOO_LARGE * max(float(scatter), 1e-4))
+
+
 def find_motion(fixes: GnssFixSeries, speed: float) -> np.ndarray:
-    """(k,) True where the horizontal speed is known to exceed speed [m/s]."""
+    """(k,) True where the horizontal speed is known to exceed speed [m/s], or half of the usual speed of a vehicle that is
+    slower than that throughout."""
     velocity = np.nan_to_num(fix_velocity(fixes))
-    return np.asarray(np.hypot(velocity[:, 0], velocity[:, 1]) > speed)
+    speeds = np.hypot(velocity[:, 0], velocity[:, 1])
+    if len(speeds) and speeds.max() <= speed and _leaves_its_place(fixes):
+        moving = speeds > _LEAST_SPEED
+        speed = max(_LEAST_SPEED, _SLOW_SHARE * float(np.median(speeds[moving]))) if moving.any() else speed
+    return np.asarray(speeds > speed)
+
+
+def _leaves_its_place(fixes: GnssFixSeries) -> bool:
+    """Whether the positions reach farther than their noise can."""
+    rows = np.flatnonzero(fixes.has_position)
+    if len(rows) < 2:
+        return False
+    place = earth.ned_between(np.broadcast_to(fixes.lla[rows[0]], (len(rows), 3)), fixes.lla[rows])[:, :2]
+    reach = float(np.linalg.norm(np.ptp(place, axis=0)))
+    return reach > 2 * (_SIGNIFICANT + 1) * float(np.median(_position_std(fixes, rows)))
 
 
 def find_initial_standstill(imu: ImuSeries, fixes: GnssFixSeries) -> int:

@@ -121,7 +121,7 @@ def match_course(sources: Sources, start: NavState, t_ns: int, moving: np.ndarra
     scatter = float(np.sqrt(max(0.0, -2 * np.log(min(1.0, abs(mean))))))
     std = float(np.sqrt(options.course_std**2 + drift**2 + scatter**2))
     inertial = (x[index, 3] - x[base, 3]) + 1j * (x[index, 4] - x[base, 4])
-    return _judge(float(np.angle(mean)), float(np.angle(np.sum(gnss * np.conj(inertial)))), std)
+    return _judge(float(np.angle(mean)) - options.forward, float(np.angle(np.sum(gnss * np.conj(inertial)))), std)
 
 
 def _judge(course: float, matched: float, std: float) -> Heading:
@@ -140,7 +140,7 @@ def _judge(course: float, matched: float, std: float) -> Heading:
 
 def course_heading(velocity: Floats, options: AlignmentOptions) -> Heading:
     """Heading of a vehicle that moves with velocity (3,) NED [m/s]."""
-    yaw = float(np.arctan2(velocity[1], velocity[0]))
+    yaw = float(np.arctan2(velocity[1], velocity[0])) - options.forward
     return Heading(yaw, max(options.course_std, float(np.radians(5))), "the course over ground")
 
 
@@ -149,7 +149,7 @@ def unknown_heading(options: AlignmentOptions) -> Heading:
     if options.method not in ("auto", "course"):
         raise LogError(f"alignment: method '{options.method}' found no heading; choose another alignment.method")
     warning = (
-        f"heading is unknown: the GNSS speed never exceeds {options.min_speed:g} m/s; give it with alignment.given_deg, "
-        "or lower alignment.min_speed_mps"
+        "heading is unknown: no motion of the fixes stands out of their noise; give it with alignment.given_deg, or take a "
+        "log that goes on until the vehicle moves"
     )
     return Heading(0.0, float(np.pi / np.sqrt(3)), "nowhere (unknown)", warning)
