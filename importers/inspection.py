@@ -17,6 +17,7 @@ from importers.roles.sources import Clock, Source, join_sources
 from importers.rows.clock import leap_seconds
 from importers.rows.log import Channel, Log, Table
 from importers.settings import AttitudeInput, FixInput, ImuInput, InputSettings, ReferenceInput
+from importers.vetting.vet import vet
 from navreplay.geodesy.time_scales import LeapSeconds, gps_from_utc
 from navreplay.timeline import LogError, SourceFile, Times
 
@@ -90,7 +91,8 @@ def inspect_logs(
         findings.append(Finding("error", "unusable", f"{error}.", ""))
     else:
         assumptions, recognised = timeline.provenance.assumptions, timeline.provenance.recognised
-        findings += [finding for finding in preflight(timeline) if finding.code not in _implied(open_choices)]
+        timeline, vetted = vet(timeline)
+        findings += [finding for finding in (*vetted, *preflight(timeline)) if finding.code not in _implied(open_choices)]
     files = tuple(describe_file(log) for log in everything)
     return Inspection(files, channels, tuple(findings), open_choices, assumptions, recognised)
 

@@ -1,0 +1,47 @@
+"""Vetting of a timeline: every comparison in turn, with the accounting of what it left out."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from importers.findings import Finding
+from importers.vetting.jumps import leave_out_jumps
+from importers.vetting.repeats import leave_out_repeats
+from importers.vetting.velocities import vet_velocities
+from importers.vetting.vetted import Vetted
+from navreplay.timeline import ChannelUse, Timeline
+
+__all__ = ["vet"]
+
+
+def vet(timeline: Timeline) -> tuple[Timeline, tuple[Finding, ...]]:
+    """The timeline to use, and what was found wrong with the one that was read.
+
+    The reference is never touched. In the accounting of channels a row that is left out whole is rejected, with the reason.
+    """
+    fixes = timeline.fixes
+    if fixes is None:
+        return timeline, ()
+    findings: list[Finding] = []
+    channels = timeline.provenance.channels
+    for step in (leave_out_repeats, vet_velocities, leave_out_jumps):
+        vetted = step(fixes)
+        channels = _account(channels, vetted)
+        fixes = vetted.fixes
+        findings += vetted.findings
+    if not findings:
+        return timeline, ()
+    return replace(timeline, fixes=fixes, provenance=replace(timeline.provenance, channels=channels)), tuple(findings)
+
+
+def _account(channels: Sequence[ChannelUse], vetted: Vetted) -> tuple[ChannelUse, ...]:
+    """The accounting of the channels that gave the fixes, with the rows rejected by the step."""
+    apart = any(use.role == "velocity" for use in channels)
+    gone = {"fix": vetted.positions_out if apart else vetted.rows_out, "velocity": vetted.velocities_out}
+    complete = []
+    for use in channels:
+        count = min(gone.get(use.role, 0), use.used)
+        if count:
+            rejected = {**use.rejected, vetted.reason: use.rejected.get(vetted.reason, 0) + count}
+            use = replace(use, used=use.used - count, rejected=rejected)
+        complete.append(use)
+    return tuple(complete)
