@@ -69,7 +69,8 @@ class AlignmentOptions:
     (never taken by itself) takes roll, pitch and yaw of the reference. given: angles where method is ``given``; given_std
     their standard deviations, about the body's x, y and z. static_window [s]: longest static stretch used for levelling.
     min_speed [m/s]: GNSS speed from which course counts as heading. course_std [rad]: floor on the standard deviation of a
-    heading from course (side slip, mounting). max_gyrocompass_std [rad]: a worse gyrocompass is not used.
+    heading from course (side slip, mounting). forward [rad]: where the direction of travel lies in the body's x-y plane, from x
+    to the right. max_gyrocompass_std [rad]: a worse gyrocompass is not used.
     Where nothing in the log tells the place: position is latitude, longitude [rad] and height [m] at the first IMU sample,
     velocity NED [m/s], with their standard deviations NED [m], [m/s].
     """
@@ -80,6 +81,7 @@ class AlignmentOptions:
     static_window: float = 60.0
     min_speed: float = 2.0
     course_std: float = 3 * _DEG
+    forward: float = 0.0
     max_gyrocompass_std: float = 2 * _DEG
     position: tuple[float, float, float] | None = None
     position_std: tuple[float, float, float] = (10.0, 10.0, 10.0)
@@ -90,7 +92,8 @@ class AlignmentOptions:
 @dataclass(frozen=True, slots=True)
 class GateOptions:
     """Innovation gate: probability of a good measurement to pass (1.0 switches the gate off); after reset_after rejected
-    epochs in a row the prior covariance is inflated until the next measurement passes (0: never)."""
+    epochs of a kind in a row, and 10 s where the filter had agreed with the kind before, the covariance of what the kind
+    measures is widened until it passes (0: never)."""
 
     probability: float = 0.9999
     reset_after: int = 10

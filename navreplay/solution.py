@@ -32,7 +32,8 @@ class InnovationSeries:
     kind: ``position``, ``velocity``, ``heading``, ... labels: one per component, e.g. ``north``. unit: of the residuals.
     t_ns: (k,). residual: (k, m). std: (k, m) square root of the diagonal of S. noise_std: (k, m) square root of the
     diagonal of the R that was used, nominal_std: (k, m) of the R that was told. nis: (k,) residual' S^-1 residual with the R
-    that was used. used: (k,) bool. reason: k phrases, empty where used.
+    that was used. used: (k,) bool. reason: k phrases, empty where used. step: (k, m) the residual less what the epoch before
+    was left off by: what the measurement changed by beside the inertial motion; NaN where there is none before.
     """
 
     kind: str
@@ -47,6 +48,7 @@ class InnovationSeries:
     used: NDArray[np.bool_]
     reason: tuple[str, ...]
     sources: tuple[str, ...] = ()
+    step: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -15,10 +15,11 @@ kept apart."""
 
 
 class Settled(NamedTuple):
-    """What to filter with. estimated: figures of the options that were found. notes: sentences for the user."""
+    """What to filter with. adapter: None for that of the method. estimated: figures of the options that were found. notes:
+    sentences for the user."""
 
     options: FilterOptions
-    adapter: NoiseAdapter[Any]
+    adapter: NoiseAdapter[Any] | None
     estimated: Mapping[str, float | tuple[float, float]]
     notes: tuple[str, ...]
 

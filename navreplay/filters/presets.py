@@ -25,6 +25,7 @@ from navreplay.adapt.windowed.iae_q import IaeQ
 from navreplay.adapt.windowed.sage_husa import SageHusa
 from navreplay.calibration.auto import Auto
 from navreplay.calibration.em_offline import EmOffline
+from navreplay.calibration.review import Review
 from navreplay.calibration.settled import Calibration
 from navreplay.filters.cubature import Cubature
 from navreplay.filters.moments import Linearised, MomentRule
@@ -39,7 +40,8 @@ __all__ = ["PRESETS", "BankPreset", "Method", "Preset", "build_method"]
 class Method:
     """What the epoch loop runs. name: of the preset. calibration: where the noise is first estimated from the whole log.
     considers: with biases that are not estimated (see `navreplay.filters.consider`). tracking: inflates the prior before the
-    adapter sees it. weighting: of a bank of which rule and adapter make each hypothesis."""
+    adapter sees it. weighting: of a bank of which rule and adapter make each hypothesis. review: looks at the solution, and may
+    ask for another pass."""
 
     name: str
     rule: MomentRule
@@ -48,6 +50,7 @@ class Method:
     considers: bool = False
     tracking: PartialTracking | None = None
     weighting: Mmae | None = None
+    review: Review | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,11 +65,12 @@ class Preset:
     calibration: Callable[..., Calibration] | None = None
     considers: bool = False
     tracking: Callable[..., PartialTracking] | None = None
+    review: Callable[..., Review] | None = None
 
     @property
     def parameters(self) -> Mapping[str, Any]:
         """Names and defaults of the parameters."""
-        parts = (self.adapter, self.rule, self.calibration, self.tracking)
+        parts = (self.adapter, self.rule, self.calibration, self.tracking, self.review)
         return {name: default for part in parts if part for name, default in _defaults(part).items()}
 
     def build(self, parameters: Mapping[str, object]) -> Method:
@@ -74,7 +78,9 @@ class Preset:
         rule, adapter = (_share_of(part, parameters) for part in (self.rule, self.adapter))
         calibration = self.calibration(**_share_of(self.calibration, parameters)) if self.calibration else None
         tracking = self.tracking(**_share_of(self.tracking, parameters)) if self.tracking else None
-        return Method(self.name, self.rule(**rule), self.adapter(**adapter), calibration, self.considers, tracking)
+        review = self.review(**_share_of(self.review, parameters)) if self.review else None
+        known = self.rule(**rule), self.adapter(**adapter), calibration, self.considers, tracking
+        return Method(self.name, *known, review=review)
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +120,7 @@ def _share_of(part: Callable[..., Any], parameters: Mapping[str, Any]) -> dict[s
 PRESETS: dict[str, Preset | BankPreset] = {
     preset.name: preset
     for preset in (
+        Preset("checked", "fixed, with the noise that the whole log bears out (the default)", Fixed, review=Review),
         Preset("fixed", "extended Kalman filter with the noise it is told", Fixed),
         Preset("ekf", "extended Kalman filter in the direct formulation: the same as fixed (Lou et al. 2019)", Fixed),
         Preset("eckf", "biases reckoned with but not estimated (Schmidt 1966, Lou et al. 2019)", Fixed, considers=True),

@@ -8,7 +8,8 @@ import numpy as np
 
 from navreplay.aiding.ranges import RangeAiding
 from navreplay.calibration.linear_log import LinearLog
-from navreplay.calibration.settled import settle_nothing
+from navreplay.calibration.review import Review
+from navreplay.calibration.settled import Settled, settle_nothing
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.filters.consider import Setup, check_considers, set_up
 from navreplay.filters.guidance import Guidance, choose_guidance
@@ -55,10 +56,25 @@ def run_filter(timeline: Timeline, method: Method, options: FilterOptions, progr
 
         settled = method.calibration.settle(options, trace)
         progress = next(shares)
-    method = replace(method, adapter=settled.adapter, calibration=None)
+    method = replace(method, adapter=settled.adapter or method.adapter, calibration=None)
     solution = _run_passes(timeline, method, settled.options, None, progress)
+    if method.review is not None:
+        solution, settled = _reviewed(timeline, method, method.review, settled, solution, progress)
     told = tuple(Event(int(solution.t_ns[0]), "info", note) for note in settled.notes)
     return replace(solution, estimated=settled.estimated, events=told + solution.events)
+
+
+def _reviewed(
+    timeline: Timeline, method: Method, review: Review, settled: Settled, solution: Solution, progress: Progress | None
+) -> tuple[Solution, Settled]:
+    """The solution, or that of a further pass with what a look at it asks for; and what it was made with."""
+    for _ in range(review.looks):
+        amended = review.amend(settled.options, solution)
+        if amended is None:
+            break
+        settled = amended._replace(notes=settled.notes + amended.notes, estimated={**settled.estimated, **amended.estimated})
+        solution = _run_passes(timeline, method, settled.options, None, progress)
+    return solution, settled
 
 
 def _share_out(progress: Progress | None, passes: int) -> list[Progress | None]:
@@ -94,7 +110,7 @@ def _run_passes(
     rows = []
     for stretch in stretches:
         try:
-            rows.append(_run_stretch(timeline, guidance, stretch, setup, options, recorder, traces, report))
+            rows += _run_stretch(timeline, guidance, stretch, setup, options, recorder, traces, report)
         except LogError as error:
             if len(stretches) == 1:
                 raise
@@ -161,15 +177,38 @@ def _run_stretch(
     recorder: Recorder,
     traces: Traces | None,
     report: Callable[[int], None],
-) -> Rows:
+) -> list[Rows]:
+    """The rows of a stretch: one part, or more where the filter lost its way and was started anew from the measurements."""
     start_ns, state, cov = guidance.start(timeline, imu, options, recorder)
-    aiding = guidance.aiding
-    estimator = _traced(setup.estimator(guidance.gate(options.gate), recorder), guidance.model, aiding.t_ns, traces)
-    epochs = np.flatnonzero((aiding.t_ns > start_ns) & (aiding.t_ns <= imu.t_ns[-1]))
-    nodes = np.union1d(aiding.t_ns[epochs], _output_times(start_ns, int(imu.t_ns[-1]), options.output_rate))
-    steps = make_steps(imu, np.append(nodes, start_ns)).after(start_ns)
     cov = setup.start_covariance(cov)
-    return _run_epochs(steps, nodes, aiding.t_ns, epochs, state, cov, estimator, setup.model, options, report)
+    aiding, end_ns = guidance.aiding, int(imu.t_ns[-1])
+    parts = []
+    while True:
+        estimator = _traced(setup.estimator(guidance.gate(options.gate), recorder), guidance.model, aiding.t_ns, traces)
+        epochs = np.flatnonzero((aiding.t_ns > start_ns) & (aiding.t_ns <= end_ns))
+        nodes = np.union1d(aiding.t_ns[epochs], _output_times(start_ns, end_ns, options.output_rate))
+        steps = make_steps(imu, np.append(nodes, start_ns)).after(start_ns)
+        rows = _run_epochs(steps, nodes, aiding.t_ns, epochs, state, cov, estimator, setup.model, options, report)
+        parts.append(rows)
+        lost_ns = int(rows.t_ns[-1])
+        if not len(nodes) or lost_ns >= nodes[-1]:
+            return parts
+        try:
+            start_ns, state, cov = guidance.start(timeline, _rest_of(imu, lost_ns), options, recorder)
+            cov = setup.start_covariance(cov)
+            text = "the filter kept contradicting its measurements; it is started anew from them"
+        except LogError as error:
+            start_ns, state, cov = lost_ns, NavState.unpack(rows.states[-1]), rows.covariances[-1]
+            text = f"the filter keeps contradicting its measurements and could not be started anew: {error}"
+        recorder.tell(lost_ns, "warning", text)
+
+
+def _rest_of(imu: ImuSeries, t_ns: int) -> ImuSeries:
+    """The samples from t_ns on. Raises LogError where there are hardly any."""
+    first = int(np.searchsorted(imu.t_ns, t_ns))
+    if len(imu.t_ns) - first < 2:
+        raise LogError("the IMU's samples end")
+    return ImuSeries(imu.t_ns[first:], imu.gyro[first:], imu.accel[first:], imu.increments)
 
 
 def _traced(estimator: Estimator, model: ErrorModel, t_ns: Times, traces: Traces | None) -> Estimator:
@@ -224,6 +263,9 @@ def _run_epochs(
             rows.correct(node, updated)
             state, cov = updated.state, updated.cov
             report(int(t_ns[epoch]))
+            if updated.lost:
+                rows = rows.until(node)
+                break
     return rows.smoothed(model) if options.smooth else rows
 
 

@@ -1,0 +1,82 @@
+"""The default method: the filter with the noise it is told, unless its own innovations refute that (`checked`).
+
+The first pass is `fixed`, and is the result where the log bears its noise out. Each kind of measurement is then looked at over
+the whole log, by medians, which faults of single epochs do not move:
+    d_k = z_k - leftover_k-1, the change between epochs that the inertial sensors did not see: 2 R and what they drift by in
+          between, whatever the filter believes of R (the differences of Ge et al., Sensors 20 (2020) 6041, section 3);
+    nu_k, the innovation: spread + R.
+Told too small, R is scaled to what d shows, and if measurements are still shut out, to what nu shows: then the errors stay for
+longer than an epoch, and a filter that trusts them less is the honest one. Told too large, R is scaled down to what d shows.
+Assumes: noise whose told size is wrong by one factor per kind, through most of the log.
+Fails: noise that changes in level (see `auto`); a wrong process noise, which is not looked for.
+When well specified: bit-identical to `fixed`.
+"""
+
+from dataclasses import dataclass, replace
+from math import sqrt
+
+import numpy as np
+
+from navreplay.calibration.settled import Settled
+from navreplay.options import FilterOptions
+from navreplay.solution import InnovationSeries, Solution
+from navreplay.timeline import Floats
+
+__all__ = ["Review"]
+
+_SCALES = {"position": "position_noise_scale", "velocity": "velocity_noise_scale"}
+_LEAST_EPOCHS = 30
+_MEDIAN_OF_SQUARE = 0.4549
+"""Median of a squared standard normal variable."""
+_MOST_REJECTED = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Review:
+    """trusted: factors of standard deviation up to this, and down to its inverse, are not acted upon. looks: at most so many
+    passes are looked at; the second pass is final where it is borne out."""
+
+    trusted: float = 1.7
+    looks: int = 2
+
+    def amend(self, options: FilterOptions, solution: Solution) -> Settled | None:
+        """Options that the innovations of a solution made with options ask for; None where they bear the told noise out."""
+        factors: dict[str, float] = {}
+        reasons = []
+        for series in solution.innovations:
+            if series.kind not in _SCALES or len(series.t_ns) < _LEAST_EPOCHS or series.step is None:
+                continue
+            factor, reason = self._factor(series)
+            if factor != 1.0:
+                factors[series.kind] = factor
+                reasons.append(reason)
+        if not factors:
+            return None
+        scales = {_SCALES[kind]: getattr(options, _SCALES[kind]) * factor for kind, factor in factors.items()}
+        return Settled(replace(options, **scales), None, scales, tuple(reasons))
+
+    def _factor(self, series: InnovationSeries) -> tuple[float, str]:
+        """Of the standard deviations of a kind, 1 where they are borne out, and the sentence that tells it."""
+        assert series.step is not None
+        rejected = 1 - float(np.mean(series.used))
+        noise = np.square(series.noise_std)
+        by_step = sqrt(_ratio(np.square(series.step), 2 * noise))
+        by_innovation = sqrt(_ratio(np.square(series.residual) - (np.square(series.std) - noise), noise))
+        text = f"{series.kind}: "
+        if rejected > _MOST_REJECTED:
+            text += f"{100 * rejected:.0f} % were rejected; "
+        if by_step > self.trusted and (rejected > _MOST_REJECTED or by_innovation > self.trusted):
+            return by_step, f"{text}from epoch to epoch they scatter {by_step:.3g} times as much as told, and are taken so"
+        if rejected > _MOST_REJECTED and by_innovation > self.trusted:
+            return by_innovation, (
+                f"{text}they are off by {by_innovation:.3g} times what was told, for longer than an epoch, and are taken so"
+            )
+        if by_step < 1 / self.trusted and rejected <= _MOST_REJECTED:
+            return by_step, f"{text}from epoch to epoch they scatter {by_step:.3g} times as much as told, and are taken so"
+        return 1.0, ""
+
+
+def _ratio(square: Floats, variance: Floats) -> float:
+    """Of squares (k, m), some unknown, to variances (k, m), by the median over all."""
+    ratio = (square / variance)[np.isfinite(square)]
+    return max(float(np.median(ratio)) / _MEDIAN_OF_SQUARE, 1e-8) if len(ratio) else 1.0
