@@ -116,6 +116,11 @@ class AlignmentSection(Section):
     static_window_s: Positive = Field(60.0, description="longest static stretch used for levelling [s]")
     min_speed_mps: Positive = Field(2.0, description="GNSS speed from which course counts as heading [m/s]")
     course_std_deg: Positive = Field(3.0, description="least standard deviation of a heading from course [deg]")
+    forward_deg: float | None = Field(
+        None,
+        description="where the direction of travel lies in the body's x-y plane, from x to the right; without it found in the "
+        "log where it is plain [deg]",
+    )
     max_gyrocompass_std_deg: Positive = Field(2.0, description="a gyrocompass worse than this is not used [deg]")
 
     @model_validator(mode="after")
@@ -138,6 +143,7 @@ class AlignmentSection(Section):
             static_window=self.static_window_s,
             min_speed=self.min_speed_mps,
             course_std=self.course_std_deg * _DEG,
+            forward=0.0 if self.forward_deg is None else self.forward_deg * _DEG,
             max_gyrocompass_std=self.max_gyrocompass_std_deg * _DEG,
         )
 
@@ -154,7 +160,7 @@ class GateSection(Section):
         0.9999, description="probability of a good measurement to pass; 1.0 switches the gate off"
     )
     reset_after: Annotated[int, Field(ge=0)] = Field(
-        10, description="rejected epochs in a row after which the covariance is inflated; 0: never"
+        10, description="epochs rejected in a row (and 10 s, where the filter had agreed) before it is widened; 0: never"
     )
 
     def options(self) -> GateOptions:
@@ -176,7 +182,7 @@ class GapSection(Section):
 class FilterSection(Section):
     """The method (``navreplay filters`` lists them) and how it runs."""
 
-    name: str = Field("fixed", description="name of the method")
+    name: str = Field("checked", description="name of the method")
     use: Literal["auto", "fixes", "ranges", "attitudes"] = Field(
         "auto",
         description="what aids the filter beside attitudes: fixes, ranges (auto: where the log has them) or nothing else",

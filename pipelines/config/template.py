@@ -34,6 +34,7 @@ _EXAMPLES = {
     "gyro_markov_std_dps": 1e-4,
     "gyro_markov_tau_s": 300.0,
     "given_deg": [0.0, 0.0, 90.0],
+    "forward_deg": 0.0,
     "position_deg_m": [40.0, 116.3, 50.0],
     "point_deg_m": [40.0, 116.3, 50.0],
     "sigma_arcsec": [1.0, 1.0, 5.0],

@@ -29,7 +29,7 @@ def withhold_fixes(fixes: GnssFixSeries, section: OutageSection) -> GnssFixSerie
 
     Raises LogError when none would be left, or when a window meets no fix at all (a wrong week or time of week).
     """
-    kept = _thin(fixes.t_ns, section)
+    kept = _thin_fixes(fixes, section)
     for inside in _inside_windows(fixes.t_ns, section, "fix", "fixes"):
         kept &= ~inside
     if not kept.any():
@@ -54,6 +54,17 @@ def withhold_ranges(ranges: RangeSeries, section: OutageSection) -> RangeSeries:
     if kept.all():
         return ranges
     return replace(ranges, **{name: getattr(ranges, name)[kept] for name in _RANGE_COLUMNS})
+
+
+def _thin_fixes(fixes: GnssFixSeries, section: OutageSection) -> NDArray[np.bool_]:
+    """(n,) what one position per interval leaves; a velocity that stands alone goes with the nearest position."""
+    rows = np.flatnonzero(fixes.has_position)
+    if len(rows) in (0, len(fixes)):
+        return _thin(fixes.t_ns, section)
+    t_ns = fixes.t_ns[rows]
+    behind = np.clip(np.searchsorted(t_ns, fixes.t_ns), 1, max(len(rows) - 1, 1))
+    nearer = fixes.t_ns - t_ns[behind - 1] < t_ns[np.minimum(behind, len(rows) - 1)] - fixes.t_ns
+    return _thin(t_ns, section)[np.where(nearer, behind - 1, np.minimum(behind, len(rows) - 1))]
 
 
 def _thin(t_ns: Times, section: OutageSection) -> NDArray[np.bool_]:

@@ -11,15 +11,17 @@ import numpy as np
 from importers.findings import Finding
 from importers.load import load_timeline
 from importers.preflight.checks import preflight
+from importers.vetting.vet import vet
 from navreplay.evaluation.metrics import evaluate, find_outages
 from navreplay.evaluation.sky import view_sky
 from navreplay.filters.presets import build_method
 from navreplay.filters.run import run_filter
 from navreplay.solution import Solution
 from navreplay.timeline import Floats, GnssFixSeries, LogError, RangeSeries, Timeline
-from pipelines.config.spec import Config, filter_options
+from pipelines.config.spec import Config
 from pipelines.drive.outages import outage_windows, withhold_fixes, withhold_ranges
 from pipelines.drive.result import RunResult
+from pipelines.drive.set_up import find_set_up, options_of
 from pipelines.trajectory.output_point import move_to_point
 
 __all__ = ["Drive", "Progress", "filter_drive", "process", "read_drive"]
@@ -30,11 +32,13 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Drive:
-    """A drive as read: its timeline, what preflight found, and the seconds reading took."""
+    """A drive as read: its timeline, what preflight found, the seconds reading took, and the direction of travel in the body's
+    x-y plane [rad]."""
 
     timeline: Timeline
     findings: tuple[Finding, ...]
     timing_s: dict[str, float] = field(default_factory=dict)
+    forward: float = 0.0
 
 
 def process(paths: Sequence[Path], config: Config, progress: Progress | None = None) -> RunResult:
@@ -52,11 +56,21 @@ def read_drive(paths: Sequence[Path], config: Config, progress: Progress | None 
     with _stage("reading", timing, progress) as tell:
         timeline = load_timeline(paths, config.input, progress=tell)
     with _stage("checking", timing, progress):
-        findings = preflight(timeline)
+        timeline, vetted = vet(timeline)
+        timeline, forward, found = find_set_up(timeline, config)
+        findings = _one_of_a_kind((*vetted, *found, *preflight(timeline)))
     for finding in findings:
         if finding.level == "error":
             raise LogError(f"{finding.text} {finding.hint}".strip())
-    return Drive(timeline, findings, timing)
+    return Drive(timeline, findings, timing, forward)
+
+
+def _one_of_a_kind(findings: Sequence[Finding]) -> tuple[Finding, ...]:
+    """The first of each code."""
+    once: dict[str, Finding] = {}
+    for finding in findings:
+        once.setdefault(finding.code, finding)
+    return tuple(once.values())
 
 
 def filter_drive(drive: Drive, config: Config, progress: Progress | None = None) -> RunResult:
@@ -66,7 +80,7 @@ def filter_drive(drive: Drive, config: Config, progress: Progress | None = None)
     method = build_method(config.filter.name, config.filter.parameters)
     used = _withhold(timeline, config)
     with _stage("filtering", timing, progress) as tell:
-        solution = run_filter(used, method, filter_options(config), tell)
+        solution = run_filter(used, method, options_of(config, drive.forward), tell)
     with _stage("evaluating", timing, progress):
         solution = replace(solution, outages=find_outages(solution, _simulated_windows(timeline, config)))
         evaluation = None if timeline.reference is None else evaluate(solution, timeline.reference, _reference_lever(timeline))

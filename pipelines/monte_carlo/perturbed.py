@@ -1,6 +1,6 @@
 """A first-order moment rule whose predictions are wrong at given times: what an experiment on model errors needs."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -44,4 +44,4 @@ class Perturbed(Linearised):
             return moved
         states = moved.states.copy()
         states[-1] = model.retract(NavState.unpack(states[-1]), error).pack()
-        return replace(moved, states=states)
+        return moved._replace(states=states)

@@ -117,7 +117,7 @@ def test_json_is_for_programs(folder, log, capsys):
     truth = log.with_suffix(".truth.csv")
     assert cli.main(["run", str(log), "--reference", str(truth), "-o", str(folder / "json"), "--json"]) == 0
     figures = json.loads(capsys.readouterr().out)
-    assert figures["method"] == "fixed"
+    assert figures["method"] == "checked"
     assert figures["errors_m"]["all"]["horizontal_rms"] < 3
     assert {Path(path).name for path in figures["outputs"].values()} == OUTPUTS
 

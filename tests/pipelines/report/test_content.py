@@ -85,7 +85,7 @@ def test_json_holds_the_documented_keys(folder: Path) -> None:
     assert report["outages"]["count"] == len(report["outages"]["list"]) == 3
     assert report["channels"][0]["rejected"] == {"not finite": 2}
     assert report["files"][0]["sha256"] == "ab" * 32
-    assert report["configuration"]["filter"]["name"] == "fixed"
+    assert report["configuration"]["filter"]["name"] == "checked"
     innovations = report["innovations"]["position"]
     assert innovations["read"] == innovations["used"] + sum(innovations["rejected"].values())
 
