@@ -7,6 +7,7 @@ from pathlib import Path
 from importers.rinex.navigation import is_rinex_navigation, read_rinex_navigation
 from importers.rinex.observation import is_rinex_observation, read_rinex_observation
 from importers.rinex.sp3 import is_sp3, read_sp3
+from importers.rinex.text import other_kind
 from importers.rows.clock import leap_seconds
 from importers.rows.log import Log
 from importers.settings import InputSettings
@@ -19,6 +20,7 @@ from importers.text.nmea import is_nmea, read_nmea
 from importers.text.rtklib_pos import is_pos, read_pos
 from importers.text.smartphone import is_smartphone, read_smartphone
 from importers.text.tum import is_tum, read_tum
+from importers.text.unix_compress import is_compressed, unpack
 from importers.ublox.stream import UbxLog, is_ubx
 from navreplay.geodesy.time_scales import LEAP_SECONDS
 from navreplay.timeline import LogError
@@ -26,6 +28,8 @@ from navreplay.timeline import LogError
 __all__ = ["FORMATS", "Format", "open_log"]
 
 _HEAD_BYTES = 20_000
+_FAR_BYTES = 4_000_000
+"""How far a stream is searched for its first message that is read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +58,12 @@ def open_log(path: str | Path, settings: InputSettings | None = None) -> Log:
         raise LogError(
             f"{name}: does not begin like a {binary.description.split(',')[0].split(' with')[0]}; damaged, or misnamed?"
         )
+    kind = other_kind(_text(head))
+    if kind:
+        raise LogError(
+            f"{name}: a RINEX file of {kind}, which is not used; precise clocks come with the orbits of an SP3 file, "
+            "ephemerides from a navigation file"
+        )
     raise LogError(
         f"{name}: unknown format; by its content it is none of {', '.join(known.name for known in FORMATS)}. "
         "A table of numbers needs an [[input.csv]] entry that names its columns"
@@ -64,6 +74,8 @@ def _read_head(path: str) -> bytes:
     try:
         with Path(path).open("rb") as file:
             head = file.read(_HEAD_BYTES)
+            if is_compressed(head):
+                head = unpack(path, head + file.read())[:_HEAD_BYTES]
     except OSError as error:
         raise LogError(f"{path}: cannot be read: {error.strerror}") from error
     if not head:
@@ -157,7 +169,17 @@ def _open_rinex_navigation(path: str, head: bytes, settings: InputSettings) -> L
 
 
 def _open_ubx(path: str, head: bytes, settings: InputSettings) -> Log | None:
-    return UbxLog(path) if is_ubx(head) else None
+    if not is_ubx(head) and not _ubx_later(path, head):
+        return None
+    return UbxLog(path, leap_seconds(settings.leap_seconds), settings.utc_date)
+
+
+def _ubx_later(path: str, head: bytes) -> bool:
+    """Whether a stream that begins with other messages, of NMEA or UBX, holds some that are read further on."""
+    if b"\xb5\x62" not in head and not head.startswith(b"$"):
+        return False
+    with Path(path).open("rb") as file:
+        return is_ubx(file.read(_FAR_BYTES))
 
 
 def _open_sp3(path: str, head: bytes, settings: InputSettings) -> Log | None:
@@ -174,15 +196,20 @@ FORMATS: tuple[Format, ...] = (
     Format("mcap", "MCAP with ROS 2, ROS 1, Foxglove JSON or protobuf messages", (".mcap",), _open_mcap),
     Format("ros1", "ROS 1 bag", (".bag",), _open_ros1),
     Format("ros2", "ROS 2 bag: the folder, or its .db3 file", (".db3",), _open_ros2),
-    Format("ubx", "u-blox stream with raw measurements (RXM-RAWX, RXM-SFRBX)", (".ubx",), _open_ubx),
+    Format("ubx", "u-blox stream: RXM-RAWX, RXM-SFRBX, NAV-PVT, NAV-HPPOSLLH, ESF-RAW, ESF-MEAS ...", (".ubx",), _open_ubx),
     Format("csv", "any table of numbers, or matrix of a MATLAB file, by [[input.csv]]", (".csv", ".txt", ".mat"), _open_mapped),
     Format("navreplay", "this program's own CSV: imu, fix, trajectory, solution", (".csv",), _open_own),
     Format("smartphone", "Android raw measurements (device_gnss.csv)", (".csv",), _open_smartphone),
     Format("pos", "RTKLIB position file", (".pos",), _open_pos),
     Format("nmea", "NMEA 0183 (GGA and RMC)", (".nmea", ".gga"), _open_nmea),
     Format("kf-gins", "KF-GINS text: IMU increments, GNSS positions", (".txt",), _open_kf_gins),
-    Format("rinex", "RINEX 3 or 4 observations: pseudoranges", (".rnx", ".obs"), _open_rinex_observation),
-    Format("rinex-nav", "RINEX 3 or 4 navigation: ephemerides", (".rnx", ".nav"), _open_rinex_navigation),
+    Format(
+        "rinex",
+        "RINEX 2, 3 or 4 observations, also compact (Hatanaka): pseudoranges",
+        (".rnx", ".obs", ".crx"),
+        _open_rinex_observation,
+    ),
+    Format("rinex-nav", "RINEX 2, 3 or 4 navigation: ephemerides", (".rnx", ".nav"), _open_rinex_navigation),
     Format("sp3", "SP3 precise orbits and clocks", (".sp3",), _open_sp3),
     Format("tum", "TUM trajectory, as a reference", (".tum", ".txt"), _open_tum),
 )

@@ -1,4 +1,4 @@
-"""RINEX 3 and 4 navigation files: broadcast ephemerides and the ionosphere's coefficients.
+"""RINEX 2, 3 and 4 navigation files: broadcast ephemerides and the ionosphere's coefficients.
 
 Of RINEX 4 the messages LNAV, INAV, FNAV, D1, D2 and FDMA are read; CNAV and its relatives are counted as rejected.
 """
@@ -17,6 +17,8 @@ __all__ = ["is_rinex_navigation", "read_rinex_navigation"]
 _S = 1_000_000_000
 _BDT_BEHIND_GPS_S = 14
 _CALENDAR = ((4, 4), (9, 2), (12, 2), (15, 2), (18, 2), (21, 2))
+_TYPES = "NGHE"
+"""``N``, and in version 2 ``G`` GLONASS, ``H`` SBAS, ``E`` Galileo."""
 _LARGEST_FLAGS = 4096
 _MESSAGES = ("LNAV", "INAV", "FNAV", "D1", "D2", "FDMA")
 _LINES = {"G": 8, "E": 8, "C": 8, "J": 8, "R": 4}
@@ -30,8 +32,8 @@ _KEPLER_FIELDS: dict[str, tuple[int, int]] = {
 
 def is_rinex_navigation(head: str) -> bool:
     """Whether the beginning of a file is a RINEX navigation header."""
-    first = head.split("\n", 1)[0]
-    return first[60:80].startswith("RINEX VERSION") and first[20:21] in "NGHEJCR" and first[20:21] != " "
+    first = head.lstrip("\r\n").split("\n", 1)[0]
+    return first[60:80].startswith("RINEX VERSION") and first[20:21] in _TYPES and first[20:21] != " "
 
 
 def read_rinex_navigation(path: str, leap: LeapSeconds) -> Table:
@@ -59,7 +61,11 @@ def read_rinex_navigation(path: str, leap: LeapSeconds) -> Table:
         "damaged ephemeris": int(damaged.sum()),
     }
     if damaged.all():
-        raise LogError(f"{path}: the navigation file holds no ephemeris that can be read ({len(usable)} records)")
+        why = ", ".join(f"{reason} {count}" for reason, count in rejected.items() if count) or "it is empty"
+        raise LogError(
+            f"{path}: the navigation file holds no ephemeris that can be read, of {len(usable)} records ({why}); those of GPS, "
+            "Galileo, BeiDou, QZSS and GLONASS can be"
+        )
     columns = {"kepler": kepler[~damaged], "glonass": glonass[~damaged]}
     columns["klobuchar"], columns["klobuchar_system"] = _klobuchar(text, int((~damaged).sum()))
     times = np.where(is_glonass, glonass["toe_ns"], kepler["toe_ns"])[~damaged]
@@ -140,7 +146,7 @@ def _finite(records: NDArray[np.void]) -> NDArray[np.bool_]:
     for name in records.dtype.names or ():
         values = records[name]
         if values.dtype.kind == "f":
-            good &= np.isfinite(values.reshape(len(records), -1)).all(axis=1)
+            good &= np.isfinite(values).all(axis=tuple(range(1, values.ndim)))
     return good
 
 
@@ -163,7 +169,7 @@ def _klobuchar(text: RinexText, n: int) -> tuple[Floats, NDArray[np.str_]]:
 def _last_message(text: RinexText, system: str, kind: str) -> Floats:
     """The eight numbers of the last ionosphere message of a kind (RINEX 4), NaN where there is none."""
     lines = text.lines
-    marks = [row for row in range(len(lines)) if lines.buffer[lines.start[row]] == ord(">")] if text.version >= 4 else []
+    marks = lines.beginning_with(b">").tolist() if text.version >= 4 else []
     for row in reversed(marks):
         words = lines.text(row).split()
         if words[1:2] == ["ION"] and words[2:3] and words[2][0] == system and words[3:4] == [kind]:

@@ -1,23 +1,36 @@
 """What RINEX files have in common: the header, lines as bytes, and numbers in fixed columns, without a loop over lines.
 
-Source: RINEX 3.05 and 4.01 (IGS/RTCM).
+Source: RINEX 3.05 and 4.01 (IGS/RTCM). Compact RINEX (Y. Hatanaka, Bulletin of the GSI 55 (2008) 21) is unpacked by the package
+``hatanaka``.
 """
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from importers.rinex.version_2 import modern_navigation, modern_observation
 from importers.rows.ranges import satellite_names
 from importers.text.table import read_bytes
 from navreplay.timeline import Floats, LogError, Times
 
-__all__ = ["Lines", "RinexText", "calendar_ns", "exponent_numbers", "plain_numbers", "read_rinex"]
+__all__ = [
+    "Lines",
+    "RinexText",
+    "calendar_ns",
+    "exponent_numbers",
+    "header_line",
+    "is_compact",
+    "other_kind",
+    "plain_numbers",
+    "read_rinex",
+]
 
 _NEWLINE, _SPACE, _ZERO, _NOT_ASCII = 10, 32, 48, 128
 _HEADER_END = b"END OF HEADER"
-_LABEL = 60
+_LABEL, _FIRST_LINE = 60, 100
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -38,6 +51,11 @@ class Lines:
         chars[place >= self.stop[rows][:, None]] = _SPACE
         return chars
 
+    def beginning_with(self, character: bytes) -> NDArray[np.intp]:
+        """Lines whose first column holds a character."""
+        rows = np.arange(len(self))
+        return np.flatnonzero(self.field(rows, 0, 1)[:, 0] == character[0]) if len(self) else np.empty(0, dtype=np.intp)
+
     def satellites(self, rows: NDArray[np.intp]) -> NDArray[np.str_]:
         """Names (k,) that the lines rows (k,) begin with, empty where they name no satellite."""
         chars = self.field(rows, 0, 3)
@@ -51,33 +69,83 @@ class Lines:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RinexText:
-    """version: of the format. header: (content, label) of each header line. lines: the body."""
+    """version: of the file. system: the letter of its satellites, ``M`` for several, empty where it tells none. header:
+    (content, label) of each header line. lines: the body, in the layout of version 3. lost: what Compact RINEX could not give
+    back, a count of its complaints."""
 
     version: float
+    system: str
     header: tuple[tuple[str, str], ...]
     lines: Lines
+    lost: int = 0
+
+
+def is_compact(head: str) -> bool:
+    """Whether the beginning of a file is a Compact RINEX (Hatanaka) header."""
+    return head.lstrip("\r\n").split("\n", 1)[0][_LABEL:].startswith("CRINEX VERS")
+
+
+def other_kind(head: str) -> str:
+    """What a RINEX file that holds neither observations nor ephemerides holds, by its beginning; empty for any other file."""
+    first = head.lstrip("\r\n").split("\n", 1)[0]
+    if not first[_LABEL:].startswith("RINEX VERSION"):
+        return ""
+    return {"C": "satellite clocks", "M": "meteorological data"}.get(first[20:21], f"type {first[20:21]!r}")
 
 
 def read_rinex(path: str, kind: str) -> RinexText:
     """A file of kind ``O`` (observations) or ``N`` (navigation). Raises LogError where its header is cut, or of a version
-    before 3 or beyond 4."""
-    data = read_bytes(path).replace(b"\r\n", b"\n")
-    end = data.find(_HEADER_END)
-    if end < 0:
+    before 2 or beyond 4."""
+    data, lost = read_bytes(path).replace(b"\r\n", b"\n").lstrip(b"\n"), 0
+    if is_compact(data[:_FIRST_LINE].decode(errors="replace")):
+        data, lost = _unpack(path, data)
+    version = _version(path, data)
+    if data.find(_HEADER_END) < 0:
         raise LogError(f"{path}: its RINEX header has no end; the file is cut, or damaged in its header")
-    header = tuple((line[:_LABEL], line[_LABEL:].strip()) for line in data[:end].decode(errors="replace").split("\n"))
-    try:
-        version = float(header[0][0][:9])
-    except ValueError as error:
-        raise LogError(f"{path}: the first line of its RINEX header holds no version; the file is damaged") from error
-    if not 3 <= version < 5:
-        raise LogError(
-            f"{path}: RINEX {version:.2f} is not read, only versions 3 and 4; convert it (gfzrnx and RTKLIB's convbin do)"
-        )
+    if version < 3:
+        modern = modern_observation if kind == "O" else modern_navigation
+        data = modern(data.decode(errors="replace")).encode()
+    end = data.find(_HEADER_END)
+    header = tuple(header_line(line) for line in data[:end].decode(errors="replace").split("\n"))
     if header[0][0][20:21] != kind:
         raise LogError(f"{path}: its header says type {header[0][0][20:21]!r} where {kind!r} was expected; it is damaged")
     body = data.find(b"\n", end)
-    return RinexText(version, header, _split(data[body + 1 :] if body >= 0 else b""))
+    return RinexText(version, header[0][0][40:41].strip(), header, _split(data[body + 1 :] if body >= 0 else b""), lost)
+
+
+def header_line(line: str) -> tuple[str, str]:
+    """Content and label of a line of a header."""
+    return line[:_LABEL], line[_LABEL:].strip()
+
+
+def _version(path: str, data: bytes) -> float:
+    try:
+        version = float(data[:9].decode(errors="replace"))
+    except ValueError as error:
+        raise LogError(f"{path}: the first line of its RINEX header holds no version; the file is damaged") from error
+    if not 2 <= version < 5:
+        raise LogError(f"{path}: RINEX {version:.2f} is not read, only versions 2 to 4; convert it (gfzrnx does)")
+    return version
+
+
+def _unpack(path: str, data: bytes) -> tuple[bytes, int]:
+    """Observations of Compact RINEX, and how many complaints it raised. Raises LogError where the package that unpacks them is
+    missing, or refuses."""
+    try:
+        import hatanaka
+    except ImportError as error:
+        raise LogError(
+            f"{path}: Compact RINEX (Hatanaka) needs the package hatanaka: pip install 'navreplay[formats]', or unpack the "
+            "file with crx2rnx"
+        ) from error
+    try:
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always")
+            unpacked = bytes(hatanaka.crx2rnx(data, skip_strange_epochs=True))
+    except (hatanaka.HatanakaException, ValueError, OSError) as error:
+        words = " ".join(str(error).split())[:200]
+        raise LogError(f"{path}: Compact RINEX that cannot be unpacked: {words}; copy the file again") from error
+    return unpacked, len(told)
 
 
 def _split(body: bytes) -> Lines:

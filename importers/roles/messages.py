@@ -11,6 +11,7 @@ import numpy as np
 from importers.roles.ephemeris_messages import EPHEMERIS_TYPES
 from importers.roles.message_fields import covariances, numbers, numbers_of, vectors
 from importers.roles.range_messages import RANGE_TYPES
+from importers.roles.receiver_types import RECEIVER_TYPES
 from importers.rows.log import Table
 from importers.rows.tables import NO_FIX, Rows, diagonal_covariance
 from importers.text.nmea import NMEA_NOTE
@@ -40,12 +41,14 @@ _LATEST_NS = 9.2e18
 @dataclass(frozen=True, slots=True)
 class Kind:
     """roles: what a channel of a type can serve as, the first being the usual. rows: its table as rows. note: an assumption
-    that is told whenever it is used. automatic: whether it is used without being named."""
+    that is told whenever it is used. automatic: whether it is used without being named. rank: of several automatic ones in a
+    file the least is used."""
 
     roles: tuple[str, ...]
     rows: Callable[[Mapping[str, np.ndarray]], Rows]
     note: str = ""
     automatic: bool = True
+    rank: int = 0
 
 
 def find_kind(type: str) -> Kind | None:
@@ -276,11 +279,16 @@ KINDS: dict[str, Kind] = {
     "rtklib/pos": Kind(_FIX, _text),
     "kf_gins/imu": Kind(("imu",), _text_means),
     "kf_gins/gnss": Kind(_FIX, _text),
-    "nmea": Kind(_FIX, _text, NMEA_NOTE),
+    "nmea": Kind(_FIX, _text, NMEA_NOTE, rank=2),
     "tum": Kind(("reference",), _tum),
     "csv/imu": Kind(("imu",), _mapped),
     "csv/fix": Kind(_FIX, _mapped),
     "csv/velocity": Kind(("velocity",), _mapped),
     "csv/attitude": Kind(("attitude",), _mapped),
     "csv/reference": Kind(("reference",), _mapped),
-} | {type: Kind((role,), _no_rows) for role, types in _RAW_GNSS.items() for type in types}
+}
+KINDS |= {type: Kind((role,), _no_rows) for role, types in _RAW_GNSS.items() for type in types}
+KINDS |= {
+    name: Kind(type.roles, _text_means if type.means else _text, type.note, type.automatic, type.rank)
+    for name, type in RECEIVER_TYPES.items()
+}

@@ -77,7 +77,20 @@ def choose_role(logs: Sequence[Log], settings: InputSettings, reference: Log | N
         return []
     if name is not None:
         return _named(logs, role, name)
-    return _only_one([choice for choice in candidates(logs, role) if _automatic(choice.channel, role)], role)
+    return _only_one(_foremost([choice for choice in candidates(logs, role) if _automatic(choice.channel, role)]), role)
+
+
+def _foremost(choices: list[Choice]) -> list[Choice]:
+    """Of the choices in each log, those of the least rank."""
+    least: dict[int, int] = {}
+    for choice in choices:
+        least[id(choice.log)] = min(least.get(id(choice.log), _rank(choice)), _rank(choice))
+    return [choice for choice in choices if _rank(choice) == least[id(choice.log)]]
+
+
+def _rank(choice: Choice) -> int:
+    kind = find_kind(choice.channel.type)
+    return 0 if kind is None else kind.rank
 
 
 def _automatic(channel: Channel, role: str) -> bool:
@@ -93,12 +106,12 @@ def _choose_reference(logs: Sequence[Log], name: str | None, reference: Log | No
     found = candidates(searched, "reference")
     meant = [choice for choice in found if _automatic(choice.channel, "reference")]
     if reference is None:
-        return _only_one(meant, "reference")
+        return _only_one(_foremost(meant), "reference")
     if not found:
         types = ", ".join(f"{channel.name} ({channel.type})" for channel in reference.channels()) or "nothing"
         raise LogError(f"{reference.path}: no channel can serve as a reference; it holds {types}")
     absolute = [choice for choice in found if _automatic(choice.channel, "fix")]
-    return _only_one(meant or absolute or found, "reference")
+    return _only_one(_foremost(meant or absolute or found), "reference")
 
 
 def _named(logs: Sequence[Log], role: str, name: str) -> list[Choice]:

@@ -4,6 +4,7 @@ Field layouts: NMEA 0183 version 4, as receivers' protocol manuals give them. GG
 separation of the same sentence makes them ellipsoidal.
 """
 
+import re
 from datetime import date
 from typing import TYPE_CHECKING
 
@@ -18,7 +19,7 @@ from navreplay.timeline import FixStatus, Floats, LogError, Times
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["NMEA_NOTE", "is_nmea", "read_nmea"]
+__all__ = ["NMEA_NOTE", "find_sentences", "is_nmea", "read_nmea", "read_sentences"]
 
 NMEA_NOTE = (
     "NMEA sentences hold no accuracies and no vertical velocity: positions get the accuracy usual for their status, "
@@ -27,6 +28,7 @@ NMEA_NOTE = (
 _VEL_STD = (0.2, 0.2, 100.0)
 _KNOT = 1852 / 3600
 _DAY_S = 86_400
+_SENTENCE = re.compile(rb"\$[A-Z]{2}[A-Z0-9]{3},[\x20-\x7e]{0,100}\*[0-9A-Fa-f]{2}")
 _STATUS = {
     "0": NO_FIX,
     "1": int(FixStatus.SINGLE),
@@ -47,7 +49,17 @@ def is_nmea(head: str) -> bool:
 
 def read_nmea(path: str, utc_date: date | None, leap: LeapSeconds) -> Table:
     """One row per GGA sentence. Raises LogError where no position sentence is intact or no date is known."""
-    buffer = np.frombuffer(read_bytes(path), dtype=np.uint8)
+    return read_sentences(path, read_bytes(path), utc_date, leap)
+
+
+def find_sentences(stream: bytes | memoryview) -> bytes:
+    """The sentences that stand in a stream of other messages, a line each."""
+    return b"\n".join(_SENTENCE.findall(stream))
+
+
+def read_sentences(path: str, data: bytes, utc_date: date | None, leap: LeapSeconds) -> Table:
+    """The same of the lines of a file."""
+    buffer = np.frombuffer(data, dtype=np.uint8)
     starts, ends, intact = _split_sentences(buffer)
     kind = _name_sentences(buffer, starts, intact)
     gga = _fields(buffer, starts, ends, kind == "GGA", {"time": 1, "lat": 2, "lon": 4, "msl": 9, "geoid": 11}, (3, 5, 6))

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from importers.text.unix_compress import is_compressed, unpack
 from navreplay.timeline import LogError
 
 if TYPE_CHECKING:
@@ -51,11 +52,14 @@ class Selection:
 
 
 def read_bytes(path: str | Path) -> bytes:
-    """The content of a text file as UTF-8 without byte-order mark. Raises LogError when it cannot be read."""
+    """The content of a text file, also of one under Unix compress, as UTF-8 without byte-order mark. Raises
+    LogError when it cannot be read."""
     try:
         data = Path(path).read_bytes()
     except OSError as error:
         raise LogError(f"{path}: cannot be read: {error.strerror}") from error
+    if is_compressed(data):
+        data = unpack(str(path), data)
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return data.decode("utf-16", errors="replace").encode()
     return data.removeprefix(b"\xef\xbb\xbf")

@@ -150,7 +150,8 @@ def test_cut_and_damaged_records_are_counted(files: tuple[Path, Path]) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda text: text.replace("     3.", "     2.", 1), r"RINEX 2\.\d\d is not read, only versions 3 and 4"),
+        (lambda text: text.replace("     3.", "     1.", 1), r"RINEX 1\.\d\d is not read, only versions 2 to 4"),
+        (lambda text: text.replace("     3.", "     2.", 1), "holds no pseudorange of a chosen signal"),
         (lambda text: text.replace("END OF HEADER", "END OF       "), "its RINEX header has no end"),
         (lambda text: text.replace("SYS / # / OBS TYPES", "COMMENT            "), "lists no observation types"),
         (lambda text: text[: text.index("END OF HEADER") + 14], "holds no pseudorange of a chosen signal"),
