@@ -174,6 +174,24 @@ def _open_ubx(path: str, head: bytes, settings: InputSettings) -> Log | None:
     return UbxLog(path, leap_seconds(settings.leap_seconds), settings.utc_date)
 
 
+def _open_ulog(path: str, head: bytes, settings: InputSettings) -> Log | None:
+    if not head.startswith(b"ULog\x01\x12\x35"):
+        return None
+    from importers.autopilots.px4 import open_px4
+
+    return open_px4(path, leap_seconds(settings.leap_seconds))
+
+
+def _open_dataflash(path: str, head: bytes, settings: InputSettings) -> Log | None:
+    from importers.autopilots.dataflash import is_dataflash
+
+    if not is_dataflash(head):
+        return None
+    from importers.autopilots.ardupilot import open_ardupilot
+
+    return open_ardupilot(path)
+
+
 def _ubx_later(path: str, head: bytes) -> bool:
     """Whether a stream that begins with other messages, of NMEA or UBX, holds some that are read further on."""
     if b"\xb5\x62" not in head and not head.startswith(b"$"):
@@ -197,6 +215,8 @@ FORMATS: tuple[Format, ...] = (
     Format("ros1", "ROS 1 bag", (".bag",), _open_ros1),
     Format("ros2", "ROS 2 bag: the folder, or its .db3 file", (".db3",), _open_ros2),
     Format("ubx", "u-blox stream: RXM-RAWX, RXM-SFRBX, NAV-PVT, NAV-HPPOSLLH, ESF-RAW, ESF-MEAS ...", (".ubx",), _open_ubx),
+    Format("ulog", "flight log of PX4 (ULog)", (".ulg",), _open_ulog),
+    Format("dataflash", "flight log of ArduPilot (DataFlash)", (".bin",), _open_dataflash),
     Format("csv", "any table of numbers, or matrix of a MATLAB file, by [[input.csv]]", (".csv", ".txt", ".mat"), _open_mapped),
     Format("navreplay", "this program's own CSV: imu, fix, trajectory, solution", (".csv",), _open_own),
     Format("smartphone", "Android raw measurements (device_gnss.csv)", (".csv",), _open_smartphone),

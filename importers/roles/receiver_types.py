@@ -7,8 +7,6 @@ Their readers deliver the columns of a text: ``gyro``, ``accel``, ``lla``, ``vel
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from importers.ublox.sensors import SENSOR_NOTE
-
 __all__ = ["RECEIVER_TYPES", "ReceiverType"]
 
 
@@ -25,6 +23,19 @@ class ReceiverType:
 
 
 _FIX = ("fix", "reference")
+_SENSOR_NOTE = (
+    "its samples are stamped by a clock of their own, which the order of the messages in the stream ties to GPS time to about "
+    "0.1 s; input.imu.time_offset_s corrects the rest"
+)
+_BOOT_NOTE = (
+    "the autopilot's clock is set by the fixes of the smallest delay; their remaining delay (about 0.1 s) is an offset of the "
+    "IMU against the fixes, which input.imu.time_offset_s corrects"
+)
+_HEIGHT_NOTE = (
+    "ArduPilot logs heights above mean sea level; input.fix.height = 'msl' with input.fix.geoid_separation_m makes them "
+    "ellipsoidal"
+)
+_OWN_FILTER = "the autopilot's own filter serves as the reference; it shares the sensors"
 _OWN_FUSION = "the receiver's own fusion with its inertial sensor serves as the reference; it shares the fixes' errors"
 
 RECEIVER_TYPES: Mapping[str, ReceiverType] = {
@@ -32,6 +43,19 @@ RECEIVER_TYPES: Mapping[str, ReceiverType] = {
     "ubx/NAV-HPPOSLLH": ReceiverType(_FIX, rank=1),
     "ubx/HNR-PVT": ReceiverType(("reference", "fix"), _OWN_FUSION),
     "ubx/NAV-ATT": ReceiverType(("attitude",), automatic=False),
-    "ubx/ESF-RAW": ReceiverType(("imu",), SENSOR_NOTE),
-    "ubx/ESF-MEAS": ReceiverType(("imu",), SENSOR_NOTE, rank=1),
+    "ubx/ESF-RAW": ReceiverType(("imu",), _SENSOR_NOTE),
+    "ulog/sensor_combined": ReceiverType(("imu",), _BOOT_NOTE, means=True),
+    "ulog/vehicle_imu": ReceiverType(("imu",), _BOOT_NOTE, rank=1, means=True),
+    "ulog/vehicle_imu/spare": ReceiverType(("imu",), _BOOT_NOTE, automatic=False, means=True),
+    "ulog/vehicle_gps_position": ReceiverType(_FIX),
+    "ulog/sensor_gps": ReceiverType(_FIX, rank=1),
+    "ulog/sensor_gps/spare": ReceiverType(_FIX, automatic=False),
+    "ulog/vehicle_global_position": ReceiverType(("reference",), _OWN_FILTER),
+    "ulog/vehicle_attitude": ReceiverType(("attitude",), automatic=False),
+    "dataflash/IMU": ReceiverType(("imu",), _BOOT_NOTE),
+    "dataflash/IMU/spare": ReceiverType(("imu",), _BOOT_NOTE, automatic=False),
+    "dataflash/GPS": ReceiverType(_FIX, _HEIGHT_NOTE),
+    "dataflash/GPS/spare": ReceiverType(_FIX, _HEIGHT_NOTE, automatic=False),
+    "dataflash/POS": ReceiverType(("reference",), _OWN_FILTER),
+    "ubx/ESF-MEAS": ReceiverType(("imu",), _SENSOR_NOTE, rank=1),
 }

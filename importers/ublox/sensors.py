@@ -12,12 +12,8 @@ from importers.decoding.blocks import Buffer, Offsets
 from importers.decoding.byte_rows import gather
 from navreplay.timeline import Floats, Times
 
-__all__ = ["SENSOR_NOTE", "sensor_samples"]
+__all__ = ["sensor_samples"]
 
-SENSOR_NOTE = (
-    "its samples are stamped by a clock of their own, which the order of the messages in the stream ties to GPS time to about "
-    "0.1 s; input.imu.time_offset_s corrects the rest"
-)
 _GYRO = ((14, 13, 5), np.pi / 180 * 2.0**-12)
 _ACCEL = ((16, 17, 18), 2.0**-10)
 _WRAP = 1 << 32
