@@ -8,6 +8,7 @@ from importers.rinex.navigation import is_rinex_navigation, read_rinex_navigatio
 from importers.rinex.observation import is_rinex_observation, read_rinex_observation
 from importers.rinex.sp3 import is_sp3, read_sp3
 from importers.rinex.text import other_kind
+from importers.roles.mapped_log import MappedLog
 from importers.rows.clock import leap_seconds
 from importers.rows.log import Log
 from importers.settings import InputSettings
@@ -93,7 +94,12 @@ def _open_mcap(path: str, head: bytes, settings: InputSettings) -> Log | None:
         return None
     from importers.containers.mcap import McapLog
 
-    return McapLog(path)
+    return _mapped(McapLog(path), settings)
+
+
+def _mapped(log: Log, settings: InputSettings) -> Log:
+    """A log of messages with the meanings that the settings, or what is known of drivers, give its channels."""
+    return MappedLog(log, settings.message, leap_seconds(settings.leap_seconds))
 
 
 def _open_ros1(path: str, head: bytes, settings: InputSettings) -> Log | None:
@@ -101,7 +107,7 @@ def _open_ros1(path: str, head: bytes, settings: InputSettings) -> Log | None:
         return None
     from importers.containers.ros1_bag import Ros1Bag
 
-    return Ros1Bag(path)
+    return _mapped(Ros1Bag(path), settings)
 
 
 def _open_ros2(path: str, head: bytes, settings: InputSettings) -> Log | None:
@@ -112,7 +118,7 @@ def _open_ros2(path: str, head: bytes, settings: InputSettings) -> Log | None:
         return None
     from importers.containers.ros2_bag import Ros2Bag
 
-    return Ros2Bag(path)
+    return _mapped(Ros2Bag(path), settings)
 
 
 def _open_mapped(path: str, head: bytes, settings: InputSettings) -> Log | None:

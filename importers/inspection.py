@@ -11,7 +11,7 @@ from importers.findings import Finding
 from importers.formats import open_log
 from importers.load import build_timeline, describe_file, open_logs
 from importers.preflight.checks import preflight
-from importers.roles.messages import find_kind, stamp_column
+from importers.roles.messages import kind_of, stamp_column
 from importers.roles.selection import SETTING, Choice, always_used, candidates, choose_role
 from importers.roles.sources import Clock, Source, join_sources
 from importers.rows.clock import leap_seconds
@@ -121,7 +121,7 @@ def _read(logs: Sequence[Log], findings: list[Finding]) -> dict[tuple[int, str],
     """All channels that mean something to navigation."""
     tables: dict[tuple[int, str], Table] = {}
     for log in logs:
-        names = tuple(dict.fromkeys(channel.name for channel in log.channels() if find_kind(channel.type) is not None))
+        names = tuple(dict.fromkeys(channel.name for channel in log.channels() if kind_of(channel) is not None))
         try:
             read = log.read(names) if names else {}
         except LogError as error:
@@ -171,7 +171,7 @@ def _describe(
         int((interval > _GAP_FACTOR * nominal).sum()) if nominal else 0,
         float(interval.max()) if len(interval) else None,
         base,
-        kind.roles if (kind := find_kind(channel.type)) is not None else (),
+        kind.roles if (kind := kind_of(channel)) is not None else (),
         role or "unused",
     )
 
@@ -184,7 +184,7 @@ def _times(log: Log, channel: Channel, table: Table, role: str | None, settings:
     source = Source(log.path, channel, table, role or "unused")
     if role == "ephemeris":
         return np.sort(table.columns.get("t_gps_ns", table.log_time_ns))
-    if (kind := find_kind(channel.type)) is not None and "range" in kind.roles:
+    if (kind := kind_of(channel)) is not None and "range" in kind.roles:
         return np.unique(flat_source(source).table.log_time_ns)
     return np.sort(
         join_sources([source], by_role.get(role or "", settings.fix), Clock(leap_seconds(settings.leap_seconds))).t_ns

@@ -5,10 +5,11 @@ provenance.
 """
 
 from datetime import date
+from math import pi
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import AliasChoices, BaseModel, ConfigDict, Field, field_validator, model_validator
 
 __all__ = [
     "AttitudeInput",
@@ -17,12 +18,16 @@ __all__ = [
     "FixInput",
     "ImuInput",
     "InputSettings",
+    "MessageMapping",
+    "MessageQuantity",
+    "MessageTime",
     "Quantity",
     "RangeCorrections",
     "RangeInput",
     "ReferenceInput",
     "StatusName",
     "TimeBase",
+    "unit_factor",
 ]
 
 TimeBase = Literal["auto", "utc", "gps", "tai", "boot"]
@@ -104,13 +109,28 @@ class _Settings(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
+def check_axes(axes: str) -> str:
+    """The axes as they are. Raises ValueError unless they are ``auto``, or three letters that make a right-handed triad."""
+    if axes == "auto":
+        return axes
+    if len(axes) != 3 or any(letter not in _ALONG for letter in axes):
+        raise ValueError("axes must be 'auto' or three letters of f, b, r, l, u, d, such as 'flu' or 'frd'")
+    x, y, z = (_ALONG[letter] for letter in axes)
+    cross = (x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0])
+    if cross != z:
+        raise ValueError(f"axes '{axes}' are not a right-handed triad; one of the letters points the wrong way")
+    return axes
+
+
 class ImuInput(_Settings):
-    """The inertial sensor. axes: where its x, y, z point in the vehicle (forward, back, right, left, up, down), right-handed.
-    mounting_deg: roll, pitch, yaw of the so relabelled axes against the vehicle. increments: each sample is the mean over the
-    interval that ends at its stamp. time_offset_s is added to its stamps; with the time base ``boot`` of a text file it is the
-    GPS time, in seconds since 1980-01-06, at which the sensor's clock read zero."""
+    """The inertial sensor. accel_channel: where another channel holds the accelerations. axes: where its x, y, z point in
+    the vehicle (forward, back, right, left, up, down), right-handed. mounting_deg: roll, pitch, yaw of the so relabelled
+    axes against the vehicle. increments: each sample is the mean over the interval that ends at its stamp. time_offset_s is
+    added to its stamps; with the time base ``boot`` of a text file it is the GPS time, in seconds since 1980-01-06, at
+    which the sensor's clock read zero."""
 
     channel: str | None = None
+    accel_channel: str | None = None
     stamp: Stamp = "header"
     time_base: TimeBase = "auto"
     time_offset_s: float = 0.0
@@ -123,15 +143,7 @@ class ImuInput(_Settings):
     @field_validator("axes")
     @classmethod
     def _check_axes(cls, axes: str) -> str:
-        if axes == "auto":
-            return axes
-        if len(axes) != 3 or any(letter not in _ALONG for letter in axes):
-            raise ValueError("axes must be 'auto' or three letters of f, b, r, l, u, d, such as 'flu' or 'frd'")
-        x, y, z = (_ALONG[letter] for letter in axes)
-        cross = (x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0])
-        if cross != z:
-            raise ValueError(f"axes '{axes}' are not a right-handed triad; one of the letters points the wrong way")
-        return axes
+        return check_axes(axes)
 
 
 class FixInput(_Settings):
@@ -260,6 +272,129 @@ class CsvMapping(_Settings):
     satellite_blocks: dict[System, Annotated[int, Field(ge=1)]] = Field(default_factory=dict)
 
 
+MessageQuantity = (
+    Quantity
+    | Literal[
+        "speed",
+        "course",
+        "east",
+        "north",
+        "up",
+        "std_h",
+        "std_vel",
+        "var_n",
+        "var_e",
+        "var_d",
+        "var_vn",
+        "var_ve",
+        "var_vd",
+        "lat_plus",
+        "lon_plus",
+        "height_plus",
+    ]
+)
+"""What a field of a message can hold, besides: ``speed`` and ``course`` (clockwise from north) over ground; ``east``,
+``north``, ``up`` of ``origin_deg_m``; one standard deviation for both horizontal axes, or for all of a velocity; variances; and what is
+added to latitude, longitude and height (finer digits, the geoid separation of a height above mean sea level)."""
+
+
+class MessageTime(_Settings):
+    """Which field of a message is its time. base: ``auto`` is a stamp like that of a header, to which the ``time_base`` of its
+    role applies; ``gps_tow`` counts from the start of the GPS week, of week_column or else the one nearest to the recorder's
+    clock; the others as in `CsvTime`."""
+
+    column: str
+    unit: Literal["s", "ms", "us", "ns"] = "ns"
+    base: Literal["auto", "gps", "gps_unix", "gps_tow", "utc", "tai"] = "auto"
+    week_column: str | None = None
+
+
+class MessageMapping(_Settings):
+    """Meaning of the messages of a topic, or of a type, in any container.
+
+    topic, type: patterns; of those given, both must fit. columns: by quantity, the path of its field (``pose.position.x``,
+    ``rates[0]``, ``flags & 192``). units: by quantity (or ``gyro``, ``accel``, ``vel`` for all of a kind) a unit, with a factor
+    before it where there is one (``1e-7 deg``). axes: where x, y, z of an inertial sensor point. increments: its samples are
+    increments since the last one. time: without it the header's stamp, else the recorder's. status: by the text of the status
+    field, the kind of fix. no_fix: values of fields at which there is no fix. beside: types whose message of the same key is
+    joined to each; their fields are then ``Type.field``. origin_deg_m: of ``east``, ``north``, ``up``. rank: of several
+    channels that can serve, that of the lowest is taken."""
+
+    topic: str | None = None
+    type: str | None = None
+    role: Literal["imu", "fix", "velocity", "attitude", "reference"]
+    columns: dict[MessageQuantity, str] = Field(min_length=1, validation_alias=AliasChoices("columns", "fields"))
+    units: dict[str, str] = Field(default_factory=dict)
+    angle_unit: Literal["deg", "rad"] = "deg"
+    time: MessageTime | None = None
+    status: dict[str, StatusName] = Field(default_factory=dict)
+    no_fix: dict[str, tuple[float, ...]] = Field(default_factory=dict)
+    axes: str = "frd"
+    increments: bool = False
+    beside: tuple[str, ...] = ()
+    key: str | None = None
+    origin_deg_m: Vector | None = None
+    rank: int = 0
+    note: str = ""
+
+    @model_validator(mode="after")
+    def _check_match(self) -> "MessageMapping":
+        if self.topic is None and self.type is None:
+            raise ValueError("a mapping of messages needs topic or type, such as topic = '/gps/raw'")
+        if self.beside and self.key is None:
+            raise ValueError("beside needs key, the field that is equal in the messages to join")
+        return self
+
+    @field_validator("axes")
+    @classmethod
+    def _check_axes(cls, axes: str) -> str:
+        return check_axes(axes)
+
+    @field_validator("units")
+    @classmethod
+    def _check_units(cls, units: dict[str, str]) -> dict[str, str]:
+        for text in units.values():
+            unit_factor(text)
+        return units
+
+
+_UNITS = {
+    "rad": 1.0,
+    "deg": pi / 180,
+    "arcsec": pi / 648_000,
+    "m": 1.0,
+    "cm": 0.01,
+    "mm": 0.001,
+    "km": 1000.0,
+    "ft": 0.3048,
+    "m/s": 1.0,
+    "cm/s": 0.01,
+    "mm/s": 0.001,
+    "km/h": 1 / 3.6,
+    "kn": 1852 / 3600,
+    "ft/s": 0.3048,
+    "rad/s": 1.0,
+    "deg/s": pi / 180,
+    "m/s2": 1.0,
+    "g": 9.80665,
+    "mg": 9.80665e-3,
+    "m2": 1.0,
+    "m2/s2": 1.0,
+}
+
+
+def unit_factor(text: str) -> float:
+    """What a number in a unit (``mm``, ``1e-7 deg``, ``0.5 g``) is multiplied by to get it in SI and radians. Raises
+    ValueError."""
+    factor, _, unit = text.strip().rpartition(" ")
+    try:
+        return float(factor or 1) * _UNITS[unit]
+    except (KeyError, ValueError) as error:
+        raise ValueError(
+            f"no unit '{text}'; known are {', '.join(_UNITS)}, each with a factor before it, as '1e-7 deg'"
+        ) from error
+
+
 class InputSettings(_Settings):
     """Everything about the input. Where a channel is not named, the only one of a fitting type is taken; ``none`` takes none.
     leap_seconds: a table in the IERS format replacing the built-in one. gps_week: full week
@@ -274,3 +409,4 @@ class InputSettings(_Settings):
     attitude: AttitudeInput = AttitudeInput()
     reference: ReferenceInput = ReferenceInput()
     csv: tuple[CsvMapping, ...] = ()
+    message: tuple[MessageMapping, ...] = ()

@@ -3,13 +3,13 @@
 import numpy as np
 
 from importers.roles.sources import Joined, account
+from importers.rows.axes import axes_matrix
 from importers.rows.screening import Screening
 from importers.rows.tables import Rows
 from importers.settings import ImuInput
-from navreplay.geodesy.rotation import matrix_from_euler
 from navreplay.timeline import ChannelUse, Floats, ImuSeries, LogError
 
-__all__ = ["axes_matrix", "convert_imu"]
+__all__ = ["convert_imu"]
 
 _STANDARD_GRAVITY = 9.80665
 _FACTORS = {"rad/s": 1.0, "deg/s": np.pi / 180, "m/s2": 1.0, "g": _STANDARD_GRAVITY}
@@ -17,14 +17,6 @@ _BEYOND_ANY_SENSOR = 1e6
 _G_RANGE = (0.5, 1.5)
 _DEGREES_MEDIAN = 1.0
 _DEGREES_PEAK = 20.0
-_UNIT_VECTORS = {"f": (1, 0, 0), "b": (-1, 0, 0), "r": (0, 1, 0), "l": (0, -1, 0), "d": (0, 0, 1), "u": (0, 0, -1)}
-
-
-def axes_matrix(axes: str, mounting_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Floats:
-    """Matrix (3, 3) from sensor axes to vehicle axes (forward, right, down): relabelling by letters, then the mounting
-    angles."""
-    relabelled = np.array([_UNIT_VECTORS[letter] for letter in axes], dtype=np.float64).T
-    return np.asarray(matrix_from_euler(*np.radians(mounting_deg)) @ relabelled)
 
 
 def convert_imu(

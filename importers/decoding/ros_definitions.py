@@ -14,8 +14,8 @@ from rosbags.typesys.base import normalize_fieldname
 from rosbags.typesys.msg import normalize_msgtype
 from rosbags.typesys.store import Typestore
 
-from importers.decoding.gnss_definitions import DEFINITIONS
 from importers.decoding.leaves import Kind, Leaf
+from importers.drivers.packages import definitions_of
 from navreplay.timeline import LogError
 
 __all__ = ["RosType", "find_type", "normalize_msgtype"]
@@ -55,7 +55,7 @@ class RosType:
 def find_type(name: str, definition: str, language: str, encoding: str) -> RosType:
     """The type of this name (either style).
 
-    definition: text out of the log, empty where it has none (then the standard types of ROS are searched, and `DEFINITIONS`).
+    definition: text out of the log, empty where it has none (then the standard types of ROS are searched, and drivers').
     language: ``msg`` or ``idl``. encoding: ``cdr`` or ``ros1``. Raises LogError for an unknown type or a definition that does
     not parse.
     """
@@ -65,11 +65,13 @@ def find_type(name: str, definition: str, language: str, encoding: str) -> RosTy
     else:
         # Recorders since ROS 2 Iron store definitions, so a log without them is at most as new as Humble.
         store = get_typestore(Stores.ROS1_NOETIC if encoding == "ros1" else Stores.ROS2_HUMBLE)
-        for known, text in DEFINITIONS.items() if name in DEFINITIONS else ():
+        definitions = definitions_of(name.partition("/")[0])
+        for known, text in definitions.items() if name in definitions else ():
             store.register(get_types_from_msg(text, known))
     if name not in store.fielddefs:
         raise LogError(
-            f"type {name} is not defined in the log and is no standard type of ROS; record its definition with the log"
+            f"type {name} is not defined in the log, is no standard type of ROS and none of a driver known here; record its "
+            "definition with the log (ros2 bag convert of a newer release does, where the messages are installed)"
         )
     leaves: list[Leaf] = []
     try:

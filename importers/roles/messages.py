@@ -12,14 +12,14 @@ from importers.roles.ephemeris_messages import EPHEMERIS_TYPES
 from importers.roles.message_fields import covariances, numbers, numbers_of, vectors
 from importers.roles.range_messages import RANGE_TYPES
 from importers.roles.receiver_types import RECEIVER_TYPES
-from importers.rows.log import Table
+from importers.rows.log import Channel, Table
 from importers.rows.tables import NO_FIX, Rows, diagonal_covariance
 from importers.text.nmea import NMEA_NOTE
 from navreplay.geodesy.rotation import scalar_first_from_last
 from navreplay.options import FilterOptions
 from navreplay.timeline import FixStatus, Floats, LogError
 
-__all__ = ["KINDS", "Kind", "find_kind", "stamp_column"]
+__all__ = ["KINDS", "Kind", "find_kind", "kind_of", "stamp_column"]
 
 _EAST_NORTH = [1, 0, 2]
 _UP_SIGNS = np.outer([1.0, 1.0, -1.0], [1.0, 1.0, -1.0])
@@ -54,6 +54,11 @@ class Kind:
 def find_kind(type: str) -> Kind | None:
     """The kind of a message type or layout, None for one without meaning to navigation."""
     return KINDS.get(type.replace("/msg/", "/"))
+
+
+def kind_of(channel: Channel) -> Kind | None:
+    """The kind of a channel, by its mapping or else by its type; None for one without meaning to navigation."""
+    return find_kind(channel.layout or channel.type)
 
 
 def stamp_column(table: Table) -> np.ndarray | None:
@@ -281,6 +286,13 @@ KINDS: dict[str, Kind] = {
     "kf_gins/gnss": Kind(_FIX, _text),
     "nmea": Kind(_FIX, _text, NMEA_NOTE, rank=2),
     "tum": Kind(("reference",), _tum),
+    "message/imu": Kind(("imu",), _mapped),
+    "message/imu_si": Kind(("imu",), _text),
+    "message/imu_mean": Kind(("imu",), _text_means),
+    "message/fix": Kind(_FIX, _text),
+    "message/velocity": Kind(("velocity",), _text),
+    "message/attitude": Kind(("attitude",), _text),
+    "message/reference": Kind(("reference",), _text),
     "csv/imu": Kind(("imu",), _mapped),
     "csv/fix": Kind(_FIX, _mapped),
     "csv/velocity": Kind(("velocity",), _mapped),

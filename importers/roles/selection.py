@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from importers.roles.messages import find_kind
+from importers.roles.messages import kind_of
 from importers.rows.log import Channel, Log
 from importers.settings import InputSettings
 from navreplay.timeline import LogError
@@ -39,7 +39,7 @@ def candidates(logs: Sequence[Log], role: str) -> list[Choice]:
         Choice(log, channel, role)
         for log in logs
         for channel in log.channels()
-        if (kind := find_kind(channel.type)) is not None and role in kind.roles
+        if (kind := kind_of(channel)) is not None and role in kind.roles
     ]
     filled = [choice for choice in found if choice.channel.count != 0]
     return filled or found
@@ -89,12 +89,12 @@ def _foremost(choices: list[Choice]) -> list[Choice]:
 
 
 def _rank(choice: Choice) -> int:
-    kind = find_kind(choice.channel.type)
+    kind = kind_of(choice.channel)
     return 0 if kind is None else kind.rank
 
 
 def _automatic(channel: Channel, role: str) -> bool:
-    kind = find_kind(channel.type)
+    kind = kind_of(channel)
     return kind is not None and kind.automatic and kind.roles[0] == role
 
 
@@ -121,7 +121,7 @@ def _named(logs: Sequence[Log], role: str, name: str) -> list[Choice]:
         there = ", ".join(channel.name for log in logs for channel in log.channels()) or "no channel at all"
         raise LogError(f"{place}: has no channel {name}, which {SETTING[role]} names; there is {there}")
     for choice in found:
-        kind = find_kind(choice.channel.type)
+        kind = kind_of(choice.channel)
         if kind is None or role not in kind.roles:
             could = ", ".join(sorted({other.channel.name for other in candidates(logs, role)})) or "none"
             raise LogError(

@@ -8,7 +8,7 @@ import numpy as np
 
 from importers.roles.heights import fill_unknown_heights
 from importers.roles.message_fields import either_spelling
-from importers.roles.messages import find_kind, stamp_column
+from importers.roles.messages import kind_of, stamp_column
 from importers.rows.clock import gps_from_stamps
 from importers.rows.log import Channel, Table
 from importers.rows.screening import Screening
@@ -62,7 +62,7 @@ def join_sources(
     ordered = tuple(source for _, source in timed)
     rows = []
     for source in ordered:
-        kind = find_kind(source.channel.type)
+        kind = kind_of(source.channel)
         if kind is None:
             raise LogError(
                 f"{source.file}: channel {source.channel.name} of type {source.channel.type} cannot serve as {source.role}"
@@ -71,8 +71,7 @@ def join_sources(
         rows.append(extracted)
         if told:
             notes.append(f"{source.channel.name}: {told}")
-        if kind.note:
-            notes.append(f"{source.channel.name}: {kind.note}")
+        notes += [f"{source.channel.name}: {note}" for note in (kind.note, source.channel.note) if note]
     ends = np.cumsum([len(times) for times, _ in timed])
     parts = tuple(slice(int(end - len(times)), int(end)) for end, (times, _) in zip(ends, timed, strict=True))
     t_ns = np.concatenate([times for times, _ in timed])
@@ -96,7 +95,7 @@ def account(joined: Joined, screening: Screening) -> tuple[ChannelUse, ...]:
 
 
 def _extract(source: Source) -> Rows:
-    kind = find_kind(source.channel.type)
+    kind = kind_of(source.channel)
     assert kind is not None
     try:
         return kind.rows(either_spelling(source.table.columns))

@@ -15,12 +15,17 @@ __all__ = ["Channel", "Log", "Table"]
 class Channel:
     """One channel of a log. name: the topic, or the file's name where a file is one channel. type: full message type
     (``sensor_msgs/msg/Imu``, ``foxglove.LocationFix``) or the name of a layout. encoding: ``cdr``, ``ros1``, ``json``,
-    ``protobuf``, ``text``. count: messages, None where only reading would tell."""
+    ``protobuf``, ``text``. count: messages, None where only reading would tell. layout: what its table holds once a mapping
+    was applied, empty where the type tells. rank: of several channels that can serve, the lowest goes first. note: what the
+    mapping assumes."""
 
     name: str
     type: str
     encoding: str
     count: int | None
+    layout: str = ""
+    rank: int = 0
+    note: str = ""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -12,7 +12,7 @@ from importers.decoding.blocks import Buffer, Offsets
 from importers.decoding.byte_rows import gather
 from navreplay.timeline import Floats, Times
 
-__all__ = ["sensor_samples"]
+__all__ = ["samples_of_data", "sensor_samples", "signed_field", "unwrapped_ticks"]
 
 _GYRO = ((14, 13, 5), np.pi / 180 * 2.0**-12)
 _ACCEL = ((16, 17, 18), 2.0**-10)
@@ -30,14 +30,20 @@ def sensor_samples(
     the stream, and their GPS times.
     """
     place, tick, kind, value = _data(buffer, start, length, raw)
-    tick = _unwrapped(tick)
-    seconds = _tied(place, tick, epoch_start, epoch_ns)
+    tick = unwrapped_ticks(tick)
+    return samples_of_data(tick, kind, value, *_tied(place, tick, epoch_start, epoch_ns))
+
+
+def samples_of_data(
+    tick: NDArray[np.int64], kind: NDArray[np.int64], value: Floats, first: int, nanoseconds: float
+) -> dict[str, np.ndarray]:
+    """Columns as `sensor_samples`, of data (n,) with their types and ticks that count on. first: GPS time of tick 0 [ns], and
+    nanoseconds per tick, 0 where they are unknown (then all times are 0)."""
     base = np.unique(tick[kind == _GYRO[0][2]])
     gyro, accel = (
         np.column_stack([_at(base, tick[kind == code], value[kind == code]) for code in codes]) * scale
         for codes, scale in (_GYRO, _ACCEL)
     )
-    first, nanoseconds = seconds
     t_ns = first + np.rint(base * nanoseconds).astype(np.int64) if nanoseconds else np.zeros(len(base), dtype=np.int64)
     return {"t_gps_ns": t_ns, "gyro": gyro, "accel": accel}
 
@@ -54,11 +60,16 @@ def _data(
     within = np.arange(len(message)) - np.repeat(np.cumsum(count) - count, count)
     words = np.ascontiguousarray(gather(buffer, start[message] + head + within * each, each)).view("<u4").astype(np.int64)
     tick = words[:, 1] if raw else np.ascontiguousarray(heads[:, :4]).view("<u4")[:, 0].astype(np.int64)[message]
-    field = words[:, 0] & 0xFFFFFF
-    return start[message], tick, (words[:, 0] >> 24) & 0x3F, np.where(field >= 1 << 23, field - (1 << 24), field).astype(float)
+    return start[message], tick, (words[:, 0] >> 24) & 0x3F, signed_field(words[:, 0])
 
 
-def _unwrapped(tick: NDArray[np.int64]) -> NDArray[np.int64]:
+def signed_field(word: NDArray[np.int64]) -> Floats:
+    """The lower 24 bits of data words (n,), signed."""
+    field = word & 0xFFFFFF
+    return np.where(field >= 1 << 23, field - (1 << 24), field).astype(float)
+
+
+def unwrapped_ticks(tick: NDArray[np.int64]) -> NDArray[np.int64]:
     """Ticks (n,) of 32 bits that count on."""
     step = (np.diff(tick, prepend=tick[:1]) + _WRAP // 2) % _WRAP - _WRAP // 2
     return np.cumsum(step)

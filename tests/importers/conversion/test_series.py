@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from importers.conversion.imu import axes_matrix
+from importers.rows.axes import axes_matrix
 from importers.rows.log import Table
 from importers.rows.screening import longest_increasing
 from importers.settings import InputSettings
