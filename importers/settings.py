@@ -294,8 +294,9 @@ MessageQuantity = (
     ]
 )
 """What a field of a message can hold, besides: ``speed`` and ``course`` (clockwise from north) over ground; ``east``,
-``north``, ``up`` of ``origin_deg_m``; one standard deviation for both horizontal axes, or for all of a velocity; variances; and what is
-added to latitude, longitude and height (finer digits, the geoid separation of a height above mean sea level)."""
+``north``, ``up`` of ``origin_deg_m``; one standard deviation for both horizontal axes, or for all of a velocity;
+variances; and what is added to latitude, longitude and height (finer digits, the geoid separation of a height above mean
+sea level)."""
 
 
 class MessageTime(_Settings):

@@ -14,13 +14,13 @@ from importers.rows.log import Channel, Log, Table
 from importers.settings import MessageMapping
 from navreplay.geodesy.time_scales import LeapSeconds
 
-__all__ = ["MappedLog"]
+__all__ = ["CONVERTED", "MappedLog"]
 
 _FIRST_RANK = 1
 _LAST_RANK = 9
 
 Conversion = Callable[[Table, LeapSeconds, str], Table]
-_CONVERTED: Mapping[str, tuple[Conversion, str, str]] = {
+CONVERTED: Mapping[str, tuple[Conversion, str, str]] = {
     "nmea_msgs/Sentence": (sentence_fixes, "nmea", ""),
     "ublox_msgs/EsfRAW": (esf_samples, "message/imu_si", ESF_NOTE),
     "ublox_msgs/EsfMEAS": (esf_samples, "message/imu_si", ESF_NOTE),
@@ -49,7 +49,7 @@ class MappedLog:
         """Takes up a channel, once for each role that its mappings give it."""
         own = tuple(mapping for mapping in told if _fits(channel, mapping))
         known = own or tuple(mapping for mapping in meanings_of(channel.type.partition("/")[0]) if _fits(channel, mapping))
-        conversion = _CONVERTED.get(channel.type.replace("/msg/", "/")) if not own else None
+        conversion = CONVERTED.get(channel.type.replace("/msg/", "/")) if not own else None
         if conversion is not None:
             layout, note = conversion[1:]
             self._channels.append(
@@ -99,7 +99,7 @@ class MappedLog:
             return table
         if name not in self._mapped:
             type = next(channel.type for channel in self._channels if channel.name == name).replace("/msg/", "/")
-            conversion = _CONVERTED.get(type)
+            conversion = CONVERTED.get(type)
             return table if conversion is None else conversion[0](table, self._leap, f"{self.path}: {name}")
         channel, variants, told = self._mapped[name]
         joined = _joined(table, beside, variants[0].key)

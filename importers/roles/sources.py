@@ -19,6 +19,9 @@ from navreplay.timeline import ChannelUse, LogError, Times
 
 __all__ = ["Clock", "Joined", "Source", "account", "join_sources"]
 
+_EARLIEST_UNIX_NS = 631_152_000 * 10**9
+_MOST_DELAY_NS = 5e9
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Source:
@@ -153,13 +156,21 @@ def _times(
         notes.append(f"{name}: timed by the clock of the recorder, taken as UTC")
         return gps_from_stamps(table.log_time_ns, "utc", clock.leap) + offset_ns
     stamps = np.asarray(stamps, dtype=np.int64)
-    if settings.time_base == "boot":
+    if settings.time_base == "boot" or (settings.time_base == "auto" and _counts_from_power_on(stamps, table)):
         shift, told = _boot_shift(stamps, table, clock)
         notes.append(f"{name}: its stamps count from power-on; {told}")
         return gps_from_stamps(stamps + shift, "utc", clock.leap) + offset_ns
     if settings.time_base == "auto":
         notes.append(f"{name}: its stamps are taken as UTC")
     return gps_from_stamps(stamps, settings.time_base, clock.leap) + offset_ns
+
+
+def _counts_from_power_on(stamps: Times, table: Table) -> bool:
+    """Whether stamps are of no calendar, but advance with the clock of the recorder, which is."""
+    if len(stamps) < 2 or np.median(stamps) >= _EARLIEST_UNIX_NS or np.median(table.log_time_ns) < _EARLIEST_UNIX_NS:
+        return False
+    low, high = np.quantile((table.log_time_ns - stamps).astype(np.float64), [0.05, 0.95])
+    return bool(high - low < _MOST_DELAY_NS)
 
 
 def _boot_shift(stamps: Times, table: Table, clock: Clock) -> tuple[int, str]:

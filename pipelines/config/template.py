@@ -17,6 +17,7 @@ _EXAMPLES = {
     "input.utc_date": "2025-07-08",
     "channel": "/topic",
     "velocity_channel": "/topic",
+    "accel_channel": "/topic",
     "geoid_separation_m": 47.0,
     "input.reference.file": "truth.csv",
     "max_speed_jump_mps": 50.0,
@@ -50,6 +51,7 @@ _INPUT = {
     "gps_week": "full GPS week, where a file holds only seconds of week",
     "utc_date": "date of the first sentence, where an NMEA file holds none",
     "channel": "topic or file name; without it chosen by type where that is unambiguous",
+    "accel_channel": "topic or file name of the accelerations, where they are not beside the angular rates",
     "velocity_channel": "topic or file name of the velocity, where it is not in the fixes",
     "stamp": "header: stamp in the message; log: time of recording",
     "time_base": "auto, utc, gps, tai or boot",
@@ -73,6 +75,7 @@ _INPUT = {
     "file": "file with the reference solution",
     "from_fixes": "take the log's own fixes, before any are withheld",
     "csv": "tables of numbers without a layout of their own, see docs/formats.md",
+    "message": "messages of types without a meaning known here, see docs/formats.md",
     "status": 'kinds of fixes that count, such as ["fixed"]; empty: all',
     "max_speed_jump_mps": "rows beside a larger implied speed are dropped [m/s]",
     "origin_deg_m": "origin of a local frame: latitude [deg], longitude [deg], height [m]",
@@ -118,7 +121,9 @@ def _describe_key(path: str, key: str, value: object, field: FieldInfo) -> Itera
     example = _EXAMPLES.get(f"{path}.{key}", _EXAMPLES.get(key))
     text = field.description or _INPUT.get(f"{path}.{key}") or _INPUT.get(key)
     comment = f" # {text}" if text else ""
-    if value is not None:
+    if key == "message" and not value:
+        yield f"# {key} = []{comment}"  # an array written here could not be added to by [[input.message]] below
+    elif value is not None:
         yield f"{key} = {_inline(value)}{comment}"
     elif example is not None:
         yield f"# {key} = {_inline(example)}{comment}"

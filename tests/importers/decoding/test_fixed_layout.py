@@ -192,7 +192,7 @@ def test_idl_definition() -> None:
 
 
 def test_unknown_type_is_named() -> None:
-    with pytest.raises(LogError, match="type my_msgs/msg/Speed is not defined in the log and is no standard type of ROS"):
+    with pytest.raises(LogError, match="type my_msgs/msg/Speed is not defined in the log, is no standard type of ROS"):
         find_type("my_msgs/msg/Speed", "", "msg", "cdr")
 
 
