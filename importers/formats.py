@@ -180,6 +180,14 @@ def _open_ubx(path: str, head: bytes, settings: InputSettings) -> Log | None:
     return UbxLog(path, leap_seconds(settings.leap_seconds), settings.utc_date)
 
 
+def _open_novatel(path: str, head: bytes, settings: InputSettings) -> Log | None:
+    if not any(sync in head for sync in (b"\xaaD\x12", b"\xaaD\x13", b"A,")):
+        return None
+    from importers.receivers.novatel import is_novatel, open_novatel
+
+    return open_novatel(path) if is_novatel(head) else None
+
+
 def _open_ulog(path: str, head: bytes, settings: InputSettings) -> Log | None:
     if not head.startswith(b"ULog\x01\x12\x35"):
         return None
@@ -221,6 +229,12 @@ FORMATS: tuple[Format, ...] = (
     Format("ros1", "ROS 1 bag", (".bag",), _open_ros1),
     Format("ros2", "ROS 2 bag: the folder, or its .db3 file", (".db3",), _open_ros2),
     Format("ubx", "u-blox stream: RXM-RAWX, RXM-SFRBX, NAV-PVT, NAV-HPPOSLLH, ESF-RAW, ESF-MEAS ...", (".ubx",), _open_ubx),
+    Format(
+        "novatel",
+        "NovAtel OEM stream, binary or ASCII: RANGE, BESTPOS, BESTVEL, RAWIMUSX, INSPVAX ...",
+        (".gps",),
+        _open_novatel,
+    ),
     Format("ulog", "flight log of PX4 (ULog)", (".ulg",), _open_ulog),
     Format("dataflash", "flight log of ArduPilot (DataFlash)", (".bin",), _open_dataflash),
     Format("csv", "any table of numbers, or matrix of a MATLAB file, by [[input.csv]]", (".csv", ".txt", ".mat"), _open_mapped),

@@ -5,6 +5,7 @@ Types are named without the ``/msg/`` of ROS 2. ROS conventions are those of REP
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -222,11 +223,12 @@ def _tum(columns: Mapping[str, np.ndarray]) -> Rows:
     return Rows(local=columns["local"], q=columns["q"], ros_attitude=True)
 
 
-def _text(columns: Mapping[str, np.ndarray], units_known: bool = True, means: bool = False) -> Rows:
+def _text(columns: Mapping[str, np.ndarray], units_known: bool = True, means: bool = False, axes: str = "frd") -> Rows:
     earth_fixed = "vel_ecef" in columns
     return Rows(
         gyro=columns.get("gyro"),
         accel=columns.get("accel"),
+        sensor_axes=axes,
         units_known=units_known,
         means=means,
         lla=columns.get("lla"),
@@ -301,6 +303,6 @@ KINDS: dict[str, Kind] = {
 }
 KINDS |= {type: Kind((role,), _no_rows) for role, types in _RAW_GNSS.items() for type in types}
 KINDS |= {
-    name: Kind(type.roles, _text_means if type.means else _text, type.note, type.automatic, type.rank)
+    name: Kind(type.roles, partial(_text, means=type.means, axes=type.axes), type.note, type.automatic, type.rank)
     for name, type in RECEIVER_TYPES.items()
 }

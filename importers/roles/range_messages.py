@@ -93,6 +93,7 @@ RANGE_TYPES: Mapping[str, Callable[[Table], Table]] = {
     "smartphone": _as_they_are,
     "rinex/observation": _as_they_are,
     "ubx/RXM-RAWX": _as_they_are,
+    "novatel/RANGE": _as_they_are,
     "navreplay.GnssRanges": _own,
     "gnss_comm/GnssMeasMsg": gnss_comm_ranges,
     "gnss_comm_msgs/GnssMeasMsg": gnss_comm_ranges,

@@ -13,13 +13,15 @@ __all__ = ["RECEIVER_TYPES", "ReceiverType"]
 @dataclass(frozen=True, slots=True)
 class ReceiverType:
     """roles: the first being the usual. note: told whenever it is used. automatic: whether it is used without being named.
-    rank: among the automatic ones of a file the least is used. means: its IMU samples are means over their intervals."""
+    rank: among the automatic ones of a file the least is used. means: its IMU samples are means over their intervals.
+    axes: where those of its IMU point unless told otherwise."""
 
     roles: tuple[str, ...]
     note: str = ""
     automatic: bool = True
     rank: int = 0
     means: bool = False
+    axes: str = "frd"
 
 
 _FIX = ("fix", "reference")
@@ -34,6 +36,10 @@ _BOOT_NOTE = (
 _HEIGHT_NOTE = (
     "ArduPilot logs heights above mean sea level; input.fix.height = 'msl' with input.fix.geoid_separation_m makes them "
     "ellipsoidal"
+)
+_CASE_NOTE = (
+    "the axes of the IMU are taken as right, forward, up, as SPAN's vehicle frame; input.imu.axes says how it is mounted where "
+    "it is not so"
 )
 _OWN_FILTER = "the autopilot's own filter serves as the reference; it shares the sensors"
 _OWN_FUSION = "the receiver's own fusion with its inertial sensor serves as the reference; it shares the fixes' errors"
@@ -57,5 +63,18 @@ RECEIVER_TYPES: Mapping[str, ReceiverType] = {
     "dataflash/GPS": ReceiverType(_FIX, _HEIGHT_NOTE),
     "dataflash/GPS/spare": ReceiverType(_FIX, _HEIGHT_NOTE, automatic=False),
     "dataflash/POS": ReceiverType(("reference",), _OWN_FILTER),
+    "novatel/BESTGNSSPOS": ReceiverType(_FIX),
+    "novatel/BESTPOS": ReceiverType(_FIX, rank=1),
+    "novatel/PSRPOS": ReceiverType(_FIX, rank=2),
+    "novatel/BESTGNSSVEL": ReceiverType(("velocity",)),
+    "novatel/BESTVEL": ReceiverType(("velocity",), rank=1),
+    "novatel/PSRVEL": ReceiverType(("velocity",), rank=2),
+    "novatel/RAWIMUSX": ReceiverType(("imu",), _CASE_NOTE, means=True, axes="rfu"),
+    "novatel/RAWIMUX": ReceiverType(("imu",), _CASE_NOTE, rank=1, means=True, axes="rfu"),
+    "novatel/RAWIMUS": ReceiverType(("imu",), rank=2),
+    "novatel/RAWIMU": ReceiverType(("imu",), rank=3),
+    "novatel/INSPVAX": ReceiverType(("reference",), _OWN_FUSION),
+    "novatel/INSPVA": ReceiverType(("reference",), _OWN_FUSION, rank=1),
+    "novatel/INSPVAS": ReceiverType(("reference",), _OWN_FUSION, rank=2),
     "ubx/ESF-MEAS": ReceiverType(("imu",), _SENSOR_NOTE, rank=1),
 }
