@@ -4,6 +4,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from importers.containers.file_bytes import is_bag_folder
+from importers.containers.packed import packing_of, unpack_file
+from importers.containers.remote import fetch, is_address
+from importers.containers.stand_in import Scratch, StandIn, told_as
 from importers.rinex.navigation import is_rinex_navigation, read_rinex_navigation
 from importers.rinex.observation import is_rinex_observation, read_rinex_observation
 from importers.rinex.sp3 import is_sp3, read_sp3
@@ -49,7 +53,35 @@ def open_log(path: str | Path, settings: InputSettings | None = None) -> Log:
     unknown."""
     settings = settings or InputSettings()
     name = str(path)
+    if name == "-":
+        raise LogError("-: a log is read more than once, so it cannot come from standard input; save it to a file first")
+    if is_address(name):
+        owner = Scratch()
+        place = fetch(name, owner)
+        return _stand_in(name, place, owner, str(place), "", settings)
     head = b"" if Path(name).is_dir() else _read_head(name)
+    packing = packing_of(head)
+    if packing:
+        owner = Scratch()
+        plain, note = unpack_file(name, packing, owner)
+        return _stand_in(name, plain, owner, name, note, _with_plain_names(settings, Path(name).name, plain.name))
+    return _open_plain(name, head, settings)
+
+
+def _stand_in(path: str, place: Path, owner: Scratch, local: str, note: str, settings: InputSettings) -> Log:
+    log = told_as(path, str(place), lambda: open_log(place, settings))
+    return StandIn(log, path, str(place), owner, local, note)
+
+
+def _with_plain_names(settings: InputSettings, packed: str, plain: str) -> InputSettings:
+    """The settings, with the mappings of tables that name the packed file naming the plain one."""
+    fitting = find_mapping(packed, settings.csv)
+    if fitting is None:
+        return settings
+    return settings.model_copy(update={"csv": (fitting.model_copy(update={"match": plain}), *settings.csv)})
+
+
+def _open_plain(name: str, head: bytes, settings: InputSettings) -> Log:
     for known in FORMATS:
         log = known.open(name, head, settings)
         if log is not None:
@@ -103,8 +135,13 @@ def _mapped(log: Log, settings: InputSettings) -> Log:
 
 
 def _open_ros1(path: str, head: bytes, settings: InputSettings) -> Log | None:
-    if not head.startswith(b"#ROSBAG"):
+    if not head.startswith(b"#ROS"):
         return None
+    version = head[:20].partition(b"\n")[0].decode(errors="replace").removeprefix("#ROSBAG ").removeprefix("#ROSRECORD ")
+    if not version.startswith("V2."):
+        raise LogError(
+            f"{path}: a ROS bag of the old format {version}; write it anew with ROS 1: rosbag filter {path} new.bag True"
+        )
     from importers.containers.ros1_bag import Ros1Bag
 
     return _mapped(Ros1Bag(path), settings)
@@ -112,8 +149,8 @@ def _open_ros1(path: str, head: bytes, settings: InputSettings) -> Log | None:
 
 def _open_ros2(path: str, head: bytes, settings: InputSettings) -> Log | None:
     folder = Path(path).is_dir()
-    if folder and not any(Path(path).glob("metadata.yaml")) and not any(Path(path).glob("*.db3")):
-        raise LogError(f"{path}: the folder holds no ROS 2 bag (no metadata.yaml, no .db3); name the log file itself")
+    if folder and not is_bag_folder(Path(path)):
+        raise LogError(f"{path}: the folder holds no ROS 2 bag (no metadata.yaml, no .db3, no .mcap); name the log file itself")
     if not folder and not head.startswith(b"SQLite format 3\x00"):
         return None
     from importers.containers.ros2_bag import Ros2Bag

@@ -15,7 +15,7 @@ from importers.formats import open_log
 from importers.roles.selection import Choice, choose_channels, named_channel
 from importers.roles.sources import Clock, Source, join_sources
 from importers.rows.clock import leap_seconds
-from importers.rows.log import Log, Table
+from importers.rows.log import Log, Table, local_path
 from importers.settings import InputSettings
 from navreplay.timeline import ChannelUse, LogError, Provenance, RangeSeries, SourceFile, Timeline
 
@@ -142,7 +142,7 @@ def _ranges(
 
 def describe_file(log: Log) -> SourceFile:
     """Size and SHA-256 of a log; of a folder, over its files in the order of their names."""
-    root = Path(log.path)
+    root = local_path(log)
     files = sorted(part for part in root.rglob("*") if part.is_file()) if root.is_dir() else [root]
     digest, size = sha256(), 0
     for part in files:
@@ -154,7 +154,7 @@ def describe_file(log: Log) -> SourceFile:
 
 
 def _read_tables(logs: Sequence[Log], choices: Sequence[Choice], progress: Progress | None) -> dict[tuple[int, str], Table]:
-    sizes = [Path(log.path).stat().st_size for log in logs]
+    sizes = [local_path(log).stat().st_size for log in logs]
     tables: dict[tuple[int, str], Table] = {}
     done = 0
     for log, size in zip(logs, sizes, strict=True):

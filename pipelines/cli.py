@@ -79,7 +79,7 @@ def _add_command(
 
 
 def _add_logs(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("logs", metavar="LOG", nargs="+", type=Path, help="log files (or bag folders); several are merged")
+    parser.add_argument("logs", metavar="LOG", nargs="+", help="log files, bag folders or addresses; several are merged")
     parser.add_argument("-c", "--config", metavar="FILE", type=Path, help="configuration in TOML")
     parser.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], dest="sets", help="override one key, e.g. imu.grade=tactical"

@@ -11,7 +11,21 @@ import numpy as np
 from importers.decoding.blocks import Buffer
 from navreplay.timeline import LogError
 
-__all__ = ["map_file", "scratch_file"]
+__all__ = ["is_bag_folder", "map_file", "scratch_file", "storage_suffix"]
+
+_STORAGES = (".db3", ".mcap")
+_PACKED = (".zstd", ".zst", ".gz", ".bz2")
+
+
+def storage_suffix(path: Path) -> str:
+    """``.db3`` or ``.mcap`` where a file is a storage of a ROS 2 bag by its name, packed or not; else empty."""
+    plain = Path(path.stem if path.suffix in _PACKED else path.name)
+    return plain.suffix if plain.suffix in _STORAGES else ""
+
+
+def is_bag_folder(folder: Path) -> bool:
+    """Whether a folder is that of a ROS 2 bag, closed or not."""
+    return (folder / "metadata.yaml").exists() or any(storage_suffix(path) for path in folder.iterdir())
 
 
 def map_file(path: str, magic: bytes, format_name: str) -> Buffer:

@@ -5,12 +5,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-import zstandard
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from importers.containers.file_bytes import scratch_file
+from importers.containers.file_bytes import storage_suffix
 from importers.containers.mcap import McapLog
+from importers.containers.packed import packing_of, unpack_file
 from importers.containers.sqlite_storage import SqliteStorage
 from importers.decoding.blocks import join_columns
 from importers.decoding.channel_reading import require_channels
@@ -19,7 +19,7 @@ from navreplay.timeline import LogError
 
 __all__ = ["Ros2Bag"]
 
-_STORAGES: dict[str, Callable[[str], Log]] = {".db3": SqliteStorage, ".mcap": McapLog}
+_BY_CONTENT: tuple[tuple[bytes, Callable[[str], Log]], ...] = ((b"SQLite format 3", SqliteStorage), (b"\x89MCAP", McapLog))
 
 
 class Ros2Bag:
@@ -100,7 +100,7 @@ class Ros2Bag:
         present = [path / name for name in listed if name not in missing]
         if present:
             return present
-        files = [file for file in path.iterdir() if Path(file.name.removesuffix(".zstd")).suffix in _STORAGES]
+        files = [file for file in path.iterdir() if storage_suffix(file)]
         return sorted(files, key=lambda file: (len(file.name), file.name))
 
     def _read_metadata(self, path: Path) -> list[str]:
@@ -122,24 +122,20 @@ class Ros2Bag:
         return listed
 
     def _open(self, path: Path) -> Log:
-        if path.suffix == ".zstd":
-            path = self._unpack(path)
-        storage = _STORAGES.get(path.suffix)
-        if storage is None:
-            raise LogError(f"{path}: no ROS 2 bag: neither a directory with metadata.yaml nor a .db3 or .mcap file")
-        return storage(str(path))
+        packing = packing_of(_head(path))
+        if packing:
+            packed, (path, note) = path, unpack_file(str(path), packing, self)
+            if note:
+                self._note(f"{packed.name}: {note}")
+        return next((storage for magic, storage in _BY_CONTENT if _head(path).startswith(magic)), SqliteStorage)(str(path))
 
-    def _unpack(self, path: Path) -> Path:
-        """Decompress a storage file into a file that goes away with this object."""
-        unpacked = scratch_file(self, path.stem)
-        try:
-            with path.open("rb") as packed, unpacked.open("wb") as plain:
-                zstandard.ZstdDecompressor().copy_stream(packed, plain)
-        except zstandard.ZstdError:
-            self._note(f"{path.name} does not decompress to its end; what came out was read")
-        except OSError as error:
-            raise LogError(f"{path}: cannot be unpacked: {error.strerror}") from error
-        return unpacked
+
+def _head(path: Path) -> bytes:
+    try:
+        with path.open("rb") as file:
+            return file.read(16)
+    except OSError as error:
+        raise LogError(f"{path}: cannot be read: {error.strerror}") from error
 
 
 def _sum(counts: list[int | None]) -> int | None:

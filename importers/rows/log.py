@@ -2,13 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 
 from navreplay.timeline import Times
 
-__all__ = ["Channel", "Log", "Table"]
+__all__ = ["Channel", "Log", "Table", "local_path"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,3 +65,8 @@ class Log(Protocol):
     def read(self, names: tuple[str, ...]) -> dict[str, Table]:
         """The tables of the named channels, in one pass over the file. Raises LogError for an unknown name."""
         ...
+
+
+def local_path(log: Log) -> Path:
+    """The file or folder of a log that is here; of a fetched one, the copy."""
+    return Path(getattr(log, "local", log.path))

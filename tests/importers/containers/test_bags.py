@@ -272,8 +272,12 @@ def test_directory_without_a_bag(tmp_path: Path) -> None:
 
 
 def test_file_that_is_no_bag(tmp_path: Path) -> None:
-    with pytest.raises(LogError, match=r"neither a directory with metadata\.yaml nor a \.db3 or \.mcap file"):
-        Ros2Bag(str(tmp_path / "log.txt"))
+    path = tmp_path / "log.txt"
+    with pytest.raises(LogError, match="cannot be read: No such file"):
+        Ros2Bag(str(path))
+    path.write_text("a letter")
+    with pytest.raises(LogError, match="not a sqlite3 storage file of ROS 2: the file does not begin as one"):
+        Ros2Bag(str(path))
 
 
 def test_database_of_another_program(tmp_path: Path) -> None:
