@@ -225,6 +225,14 @@ def _open_novatel(path: str, head: bytes, settings: InputSettings) -> Log | None
     return open_novatel(path) if is_novatel(head) else None
 
 
+def _open_sbf(path: str, head: bytes, settings: InputSettings) -> Log | None:
+    if b"$@" not in head:
+        return None
+    from importers.receivers.sbf import is_sbf, open_sbf
+
+    return open_sbf(path) if is_sbf(head) else None
+
+
 def _open_ulog(path: str, head: bytes, settings: InputSettings) -> Log | None:
     if not head.startswith(b"ULog\x01\x12\x35"):
         return None
@@ -272,6 +280,7 @@ FORMATS: tuple[Format, ...] = (
         (".gps",),
         _open_novatel,
     ),
+    Format("sbf", "Septentrio SBF: MeasEpoch, PVTGeodetic, ExtSensorMeas, INSNavGeod ...", (".sbf",), _open_sbf),
     Format("ulog", "flight log of PX4 (ULog)", (".ulg",), _open_ulog),
     Format("dataflash", "flight log of ArduPilot (DataFlash)", (".bin",), _open_dataflash),
     Format("csv", "any table of numbers, or matrix of a MATLAB file, by [[input.csv]]", (".csv", ".txt", ".mat"), _open_mapped),

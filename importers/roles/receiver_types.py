@@ -76,5 +76,8 @@ RECEIVER_TYPES: Mapping[str, ReceiverType] = {
     "novatel/INSPVAX": ReceiverType(("reference",), _OWN_FUSION),
     "novatel/INSPVA": ReceiverType(("reference",), _OWN_FUSION, rank=1),
     "novatel/INSPVAS": ReceiverType(("reference",), _OWN_FUSION, rank=2),
+    "sbf/PVTGeodetic": ReceiverType(_FIX),
+    "sbf/ExtSensorMeas": ReceiverType(("imu",)),
+    "sbf/INSNavGeod": ReceiverType(("reference",), _OWN_FUSION),
     "ubx/ESF-MEAS": ReceiverType(("imu",), _SENSOR_NOTE, rank=1),
 }
