@@ -7,7 +7,17 @@ import numpy as np
 from mcap.opcode import Opcode
 
 from importers.containers.compression import DamagedDataError
-from importers.containers.mcap_records import MAGIC, MESSAGE_HEADER, RECORD_HEAD, Directory, open_chunk, read_summary, walk_file
+from importers.containers.mcap_records import (
+    MAGIC,
+    MESSAGE_HEADER,
+    RECORD_HEAD,
+    Directory,
+    footer_of,
+    is_summary_damaged,
+    open_chunk,
+    read_summary,
+    walk_file,
+)
 from importers.containers.record_file import RecordFile
 from importers.containers.record_walk import Walk
 from importers.decoding.blocks import Block, Buffer, Decoder, Loss, Offsets
@@ -24,7 +34,8 @@ _IDL = "ros2idl"
 class McapLog:
     """An MCAP file as a `Log`.
 
-    Message encodings ``cdr``, ``ros1``, ``json`` and ``protobuf``. A file without an index is scanned when opened. Of a damaged
+    Message encodings ``cdr``, ``ros1``, ``json`` and ``protobuf``. A file without an index is scanned when opened; that is told
+    only where the recording was not closed, or its index is damaged. A closed file may hold no channel at all. Of a damaged
     file everything outside the damage is read; `notes` tells what was lost. Messages in a damaged chunk are counted as
     rejected where the file's indexes tell their number. Raises LogError when nothing can be read.
     """
@@ -99,7 +110,11 @@ class McapLog:
 
     def _scan(self) -> Directory:
         """The directory of a file without a usable index, from all its records."""
-        self._file.note("no usable index (was the recording closed?); the file was read through from its start")
+        closed = footer_of(self._buffer) is not None
+        if not closed:
+            self._file.note("no usable index (was the recording closed?); the file was read through from its start")
+        elif is_summary_damaged(self._buffer):
+            self._file.note("its index is damaged; the file was read through from its start")
         walk = self._file.walk(np.empty(0, dtype=np.int64))
         directory, counts = Directory(), Counter[int]()
         for place in np.flatnonzero((walk.op == Opcode.SCHEMA) | (walk.op == Opcode.CHANNEL)):
@@ -110,9 +125,9 @@ class McapLog:
             else:
                 counts.update(item.counts)
         directory.counts = {number: counts[number] for number in directory.channels}
-        if not directory.channels:
+        if not directory.channels and (not closed or walk.fragments):
             raise LogError(
-                f"{self.path}: no channel could be read from this MCAP file; it holds no messages or is damaged beyond use"
+                f"{self.path}: no channel could be read from this MCAP file; it was cut off early, or is damaged beyond use"
             )
         return directory
 

@@ -25,6 +25,8 @@ __all__ = [
     "MESSAGE_HEADER",
     "RECORD_HEAD",
     "Directory",
+    "footer_of",
+    "is_summary_damaged",
     "open_chunk",
     "parse_record",
     "read_summary",
@@ -85,10 +87,8 @@ class Directory:
         return bool(self.channels) and not unknown and needed <= self.schemas.keys()
 
 
-def read_summary(buffer: Buffer) -> Directory | None:
-    """The directory from the summary section; None where the file has none, or a damaged or incomplete one."""
-    from importers.containers.record_scan import scan_mcap
-
+def footer_of(buffer: Buffer) -> Footer | None:
+    """The footer of a file that was closed; None where the end of the file is missing or damaged."""
     footer_at = len(buffer) - len(MAGIC) - _FOOTER_LENGTH
     if (
         footer_at < len(MAGIC) + RECORD_HEAD
@@ -96,10 +96,27 @@ def read_summary(buffer: Buffer) -> Directory | None:
         or buffer[footer_at - RECORD_HEAD] != Opcode.FOOTER
     ):
         return None
-    footer = parse_record(Footer, buffer[footer_at : footer_at + _FOOTER_LENGTH])
-    if footer is None or not len(MAGIC) < footer.summary_start < footer_at:
-        return None
-    if footer.summary_crc and zlib.crc32(buffer[footer.summary_start : -len(MAGIC) - 4].tobytes()) != footer.summary_crc:
+    return parse_record(Footer, buffer[footer_at : footer_at + _FOOTER_LENGTH])
+
+
+def is_summary_damaged(buffer: Buffer) -> bool:
+    """Whether a closed file has a summary section that cannot be where its footer says, or fails its checksum."""
+    footer = footer_of(buffer)
+    if footer is None or footer.summary_start == 0:
+        return False
+    if not len(MAGIC) < footer.summary_start < len(buffer) - len(MAGIC) - _FOOTER_LENGTH:
+        return True
+    return (
+        footer.summary_crc != 0 and zlib.crc32(buffer[footer.summary_start : -len(MAGIC) - 4].tobytes()) != footer.summary_crc
+    )
+
+
+def read_summary(buffer: Buffer) -> Directory | None:
+    """The directory from the summary section; None where the file has none, or a damaged or incomplete one."""
+    from importers.containers.record_scan import scan_mcap
+
+    footer = footer_of(buffer)
+    if footer is None or footer.summary_start == 0 or is_summary_damaged(buffer):
         return None
     directory, offsets = Directory(), []
     for opcode, start, stop in zip(*scan_mcap(buffer, footer.summary_start)[:3], strict=True):

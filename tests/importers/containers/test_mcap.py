@@ -49,7 +49,7 @@ def test_ros_messages(tmp_path: Path, encoding: str, compression: CompressionTyp
     table = log.read(("/imu",))["/imu"]
     assert (table.read, table.rejected) == (COUNT, {})
     assert_imus(table, COUNT)
-    assert ("no usable index" in "".join(log.notes)) == (options not in ({}, {"use_chunking": False}))
+    assert log.notes == (), "the file was closed, with or without an index"
 
 
 @pytest.mark.parametrize("options", [{"repeat_schemas": False}, {"repeat_channels": False}], ids=str)
@@ -291,7 +291,7 @@ def test_no_messages(tmp_path: Path) -> None:
     [
         (b"", "the file is empty; was the recording stopped before anything was written?"),
         (b"time,x,y\n1,2,3\n", "not an MCAP file: the file does not begin as one"),
-        (b"\x89MCAP0\r\n", "no channel could be read from this MCAP file; it holds no messages or is damaged beyond use"),
+        (b"\x89MCAP0\r\n", "no channel could be read from this MCAP file; it was cut off early, or is damaged beyond use"),
         (b"\x89MCAP0\r\n" + b"\xff" * 99, "no channel could be read from this MCAP file"),
     ],
 )
