@@ -26,6 +26,8 @@ from importers.text.rtklib_pos import is_pos, read_pos
 from importers.text.smartphone import is_smartphone, read_smartphone
 from importers.text.tum import is_tum, read_tum
 from importers.text.unix_compress import is_compressed, unpack
+from importers.trajectories.gpx import is_gpx, read_gpx
+from importers.trajectories.sbet import is_sbet, read_sbet
 from importers.ublox.stream import UbxLog, is_ubx
 from navreplay.geodesy.time_scales import LEAP_SECONDS
 from navreplay.timeline import LogError
@@ -265,6 +267,18 @@ def _open_sp3(path: str, head: bytes, settings: InputSettings) -> Log | None:
     return TextLog(path, "sp3", "sp3", lambda: read_sp3(path, leap_seconds(settings.leap_seconds)))
 
 
+def _open_gpx(path: str, head: bytes, settings: InputSettings) -> Log | None:
+    if not is_gpx(_text(head)):
+        return None
+    return TextLog(path, "gpx", "gpx", lambda: read_gpx(path, leap_seconds(settings.leap_seconds)))
+
+
+def _open_sbet(path: str, head: bytes, settings: InputSettings) -> Log | None:
+    if not is_sbet(head, Path(path).stat().st_size):
+        return None
+    return TextLog(path, "sbet", "sbet", lambda: read_sbet(path, settings.gps_week))
+
+
 def _open_tum(path: str, head: bytes, settings: InputSettings) -> Log | None:
     return TextLog(path, "tum", "tum", lambda: read_tum(path)) if is_tum(_text(head)) else None
 
@@ -297,6 +311,8 @@ FORMATS: tuple[Format, ...] = (
     ),
     Format("rinex-nav", "RINEX 2, 3 or 4 navigation: ephemerides", (".rnx", ".nav"), _open_rinex_navigation),
     Format("sp3", "SP3 precise orbits and clocks", (".sp3",), _open_sp3),
+    Format("gpx", "GPX tracks", (".gpx",), _open_gpx),
+    Format("sbet", "SBET trajectory of Applanix POSPac, as a reference", (".out", ".sbet"), _open_sbet),
     Format("tum", "TUM trajectory, as a reference", (".tum", ".txt"), _open_tum),
 )
 """In the order in which they are tried."""

@@ -1,4 +1,4 @@
-"""Layouts of receivers and autopilots whose columns need no translation: what each can serve as.
+"""Layouts of receivers, autopilots and trajectories whose columns need no translation: what each can serve as.
 
 Their readers deliver the columns of a text: ``gyro``, ``accel``, ``lla``, ``vel_n``, ``cov_pos``, ``cov_vel``, ``status``,
 ``q_nb``, ``cov_att``.
@@ -41,6 +41,10 @@ _CASE_NOTE = (
     "the axes of the IMU are taken as right, forward, up, as SPAN's vehicle frame; input.imu.axes says how it is mounted where "
     "it is not so"
 )
+_GPX_NOTE = (
+    "GPX holds no accuracies and no velocities; its heights are taken as they are, which is above mean sea level as a rule "
+    "(input.fix.height = 'msl' with input.fix.geoid_separation_m)"
+)
 _OWN_FILTER = "the autopilot's own filter serves as the reference; it shares the sensors"
 _OWN_FUSION = "the receiver's own fusion with its inertial sensor serves as the reference; it shares the fixes' errors"
 
@@ -79,5 +83,7 @@ RECEIVER_TYPES: Mapping[str, ReceiverType] = {
     "sbf/PVTGeodetic": ReceiverType(_FIX),
     "sbf/ExtSensorMeas": ReceiverType(("imu",)),
     "sbf/INSNavGeod": ReceiverType(("reference",), _OWN_FUSION),
+    "gpx": ReceiverType(_FIX, _GPX_NOTE, rank=3),
+    "sbet": ReceiverType(("reference",)),
     "ubx/ESF-MEAS": ReceiverType(("imu",), _SENSOR_NOTE, rank=1),
 }

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from pyarrow import parquet
 
+from importers import InputSettings, open_log
 from navreplay.geodesy.earth import ned_between
 from navreplay.geodesy.rotation import euler_from_quat, quat_from_euler, quat_from_rotvec, quat_multiply
-from navreplay.geodesy.time_scales import utc_from_gps
+from navreplay.geodesy.time_scales import utc_from_gps, week_tow_from_gps
 from navreplay.solution import Solution
 from navreplay.timeline import LogError
 from pipelines.trajectory.export import EXPORT_FORMATS, export
@@ -148,3 +149,14 @@ def test_sbet_is_seventeen_doubles_a_row(run_folder: Path, solution: Solution) -
     assert np.abs(ned_between(solution.lla, records[:, 1:4])).max() < 1e-5
     assert np.allclose(records[:, 7:10], euler_from_quat(solution.q_nb), atol=1e-8)
     assert not records[:, 10:].any()
+
+
+def test_an_exported_sbet_can_be_read_again(run_folder: Path, solution: Solution) -> None:
+    export(run_folder, "sbet", run_folder / "x.out")
+    week, _ = week_tow_from_gps(solution.t_ns)
+    log = open_log(run_folder / "x.out", InputSettings(gps_week=int(week[0])))
+    columns = log.read(("x.out",))["x.out"].columns
+    assert np.abs(columns["t_gps_ns"] - solution.t_ns).max() < 100
+    assert np.abs(ned_between(solution.lla, columns["lla"])).max() < 1e-5
+    assert np.allclose(columns["vel_n"], solution.vel_n, atol=1e-4)
+    assert np.allclose(euler_from_quat(columns["q_nb"]), euler_from_quat(solution.q_nb), atol=1e-8)
