@@ -6,7 +6,9 @@ the whole log, by medians, which faults of single epochs do not move:
           between, whatever the filter believes of R (the differences of Ge et al., Sensors 20 (2020) 6041, section 3);
     nu_k, the innovation: spread + R.
 Told too small, R is scaled to what d shows, and if measurements are still shut out, to what nu shows: then the errors stay for
-longer than an epoch, and a filter that trusts them less is the honest one. Told too large, R is scaled down to what d shows.
+longer than an epoch, and a filter that trusts them less is the honest one. Told too large, R is scaled down, but to no less
+than three times the deviations that d shows and a tenth of those told: a receiver that smooths has errors that stay and d does
+not see, and nobody tells a variance a hundred times too large by chance.
 Assumes: noise whose told size is wrong by one factor per kind, through most of the log.
 Fails: noise that changes in level (see `auto`); a wrong process noise, which is not looked for.
 When well specified: bit-identical to `fixed`.
@@ -29,6 +31,8 @@ _LEAST_EPOCHS = 30
 _MEDIAN_OF_SQUARE = 0.4549
 """Median of a squared standard normal variable."""
 _MOST_REJECTED = 0.05
+_MARGIN = 3.0
+_LEAST_FACTOR = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,15 +43,16 @@ class Review:
     trusted: float = 1.7
     looks: int = 2
 
-    def amend(self, options: FilterOptions, solution: Solution) -> Settled | None:
-        """Options that the innovations of a solution made with options ask for; None where they bear the told noise out."""
+    def amend(self, options: FilterOptions, solution: Solution, amended: bool = False) -> Settled | None:
+        """Options that the innovations of a solution made with options ask for; None where they bear the told noise out. amended:
+        the options were asked for by a look before; then noise is not scaled down further."""
         factors: dict[str, float] = {}
         reasons = []
         for series in solution.innovations:
             if series.kind not in _SCALES or len(series.t_ns) < _LEAST_EPOCHS or series.step is None:
                 continue
             factor, reason = self._factor(series)
-            if factor != 1.0:
+            if factor > 1.0 or (factor < 1.0 and not amended):
                 factors[series.kind] = factor
                 reasons.append(reason)
         if not factors:
@@ -71,8 +76,13 @@ class Review:
             return by_innovation, (
                 f"{text}they are off by {by_innovation:.3g} times what was told, for longer than an epoch, and are taken so"
             )
-        if by_step < 1 / self.trusted and rejected <= _MOST_REJECTED:
-            return by_step, f"{text}from epoch to epoch they scatter {by_step:.3g} times as much as told, and are taken so"
+        cautious = max(_MARGIN * by_step, _LEAST_FACTOR)
+        if cautious < 1 / self.trusted and rejected <= _MOST_REJECTED:
+            return cautious, (
+                f"{text}from epoch to epoch they scatter {by_step:.3g} times as much as told; with a margin for errors that "
+                f"stay, "
+                f"{cautious:.3g} times that is taken"
+            )
         return 1.0, ""
 
 

@@ -68,8 +68,8 @@ def _reviewed(
     timeline: Timeline, method: Method, review: Review, settled: Settled, solution: Solution, progress: Progress | None
 ) -> tuple[Solution, Settled]:
     """The solution, or that of a further pass with what a look at it asks for; and what it was made with."""
-    for _ in range(review.looks):
-        amended = review.amend(settled.options, solution)
+    for look in range(review.looks):
+        amended = review.amend(settled.options, solution, look > 0)
         if amended is None:
             break
         settled = amended._replace(notes=settled.notes + amended.notes, estimated={**settled.estimated, **amended.estimated})

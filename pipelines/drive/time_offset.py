@@ -48,7 +48,7 @@ def settle_time_offset(timeline: Timeline, match: YawMatch, options: FilterOptio
         f"{untouched:.2f}, tried on {trial.seconds:.0f} s)."
     )
     hint = f"They are moved for this run; set input.imu.time_offset_s = {offset:+.3f} (on top of any you have set) to keep it."
-    return shift_imu(timeline, offset), (Finding("warning", "time-offset-applied", text, hint),)
+    return shift_imu(timeline, offset), (Finding("warning", "time-offset", text, hint),)
 
 
 def shift_imu(timeline: Timeline, offset_s: float) -> Timeline:
