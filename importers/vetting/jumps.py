@@ -20,23 +20,29 @@ _SIGNIFICANT = 7.0
 _LEAST_STEP = 0.5
 _ALIKE = 0.25
 _LEAST_ROWS = 12
+_MOST = 0.25
+"""Share of the fixes that may be wrong; beyond it nobody knows which are."""
+_HARDEST = 15.0
+"""Acceleration [m/s^2] that a vehicle may have."""
 
 
 def leave_out_jumps(fixes: GnssFixSeries) -> Vetted:
     """The fixes without positions between a step away and the step back."""
-    rows = np.flatnonzero(fixes.has_position & fixes.has_velocity)
-    if len(rows) < _LEAST_ROWS or len(rows) < 0.5 * fixes.has_position.sum():
+    rows = np.flatnonzero(fixes.has_position)
+    if len(rows) < _LEAST_ROWS:
         return Vetted(fixes)
     t = (fixes.t_ns[rows] - fixes.t_ns[rows[0]]) / 1e9
     dt = np.diff(t)
     moved = ned_between(fixes.lla[rows[:-1]], fixes.lla[rows[1:]])[:, :2]
-    vel = fixes.vel_n[rows, :2]
-    steps = moved - (vel[1:] + vel[:-1]) / 2 * dt[:, None]
+    steps, unseen = _unexplained(fixes, rows, t, moved)
+    least = np.maximum(_threshold(fixes, rows, steps), unseen) * np.where(dt < _LONGEST_STEP_S, 1.0, np.inf)
+    if unseen.any():  # what is no jump is the vehicle's own change of speed
+        steps = np.where((np.linalg.norm(steps, axis=1) > least)[:, None], steps, 0.0)
     wrong = np.zeros(len(rows), dtype=np.bool_)
-    for first, behind in _excursions(t, steps, _threshold(fixes, rows, steps) * np.where(dt < _LONGEST_STEP_S, 1.0, np.inf)):
+    for first, behind in _excursions(t, steps, least):
         wrong[first:behind] = True
     count = int(wrong.sum())
-    if not count:
+    if not 0 < count <= _MOST * len(rows):
         return Vetted(fixes)
     position = np.zeros(len(fixes), dtype=np.bool_)
     position[rows[wrong]] = True
@@ -44,10 +50,26 @@ def leave_out_jumps(fixes: GnssFixSeries) -> Vetted:
     text = (
         f"{count} of {len(rows)} fixes lie between a jump of the position and the jump back, up to {largest:.3g} m, of "
         f"which their "
-        "velocities saw nothing: wrong fixes, told as accurate."
+        "velocities saw nothing, or that no vehicle makes: wrong fixes, told as accurate."
     )
     finding = Finding("warning", "fix-jumps", text, "Their positions are left out, their velocities used; nothing need be set.")
     return Vetted(drop(fixes, position, np.zeros(len(fixes), dtype=np.bool_)), (finding,), "jumps away and back", 0, count)
+
+
+def _unexplained(fixes: GnssFixSeries, rows: NDArray[np.intp], t: Floats, moved: Floats) -> tuple[Floats, Floats]:
+    """Of the steps moved (k - 1, 2) [m], the part (k - 1, 2) that velocities do not explain; and how much of it a change of
+    speed may be (k - 1,) [m], zero where velocities are known throughout. Without them the steps before tell the speed."""
+    dt = np.diff(t)
+    known = np.flatnonzero(fixes.has_velocity)
+    if len(known) >= 0.8 * len(rows):
+        at = (fixes.t_ns[known] - fixes.t_ns[rows[0]]) / 1e9
+        vel = np.column_stack([np.interp(t, at, fixes.vel_n[known, axis]) for axis in (0, 1)])
+        return moved - (vel[1:] + vel[:-1]) / 2 * dt[:, None], np.zeros(len(dt))
+    speed = moved / dt[:, None]
+    before = np.stack([np.roll(speed, shift, axis=0) for shift in (1, 2, 3)])
+    usual = np.median(before, axis=0)
+    usual[:3] = speed[:3]
+    return moved - usual * dt[:, None], _HARDEST * dt * 2 * float(np.median(dt))
 
 
 def _threshold(fixes: GnssFixSeries, rows: NDArray[np.intp], steps: Floats) -> Floats:

@@ -35,9 +35,19 @@ class FixAiding:
         if self._correlated.size:
             self.model = ClockedModel(self._inertial, self._correlated)
         self._noise = fix_noise(fixes, options)
+        scales = options.position_noise_scale, options.velocity_noise_scale
+        self._scales = tuple(options.noise_scale * scale for scale in scales)
         self._lever_b = lever_b
         self._has_position = fixes.has_position
         self._has_velocity = fixes.has_velocity & options.use_velocity
+
+    @property
+    def told_fixes(self) -> GnssFixSeries:
+        """The fixes with their covariances scaled as the options say, for an alignment that weighs them."""
+        position, velocity = self._scales
+        if position == velocity == 1:
+            return self.fixes
+        return replace(self.fixes, cov_pos=self.fixes.cov_pos * position**2, cov_vel=self.fixes.cov_vel * velocity**2)
 
     @property
     def t_ns(self) -> Times:

@@ -17,7 +17,7 @@ from navreplay.measurements.ranges import Antenna, RangeNoise, carried_antenna, 
 from navreplay.mechanisation.strapdown import NavState
 from navreplay.options import FilterOptions
 from navreplay.start.alignment import Alignment
-from navreplay.timeline import Floats, RangeSeries, Times
+from navreplay.timeline import Floats, GnssFixSeries, RangeSeries, Times
 from navreplay.update.measurement import Measurement
 from navreplay.update.record import Recorder
 
@@ -72,6 +72,11 @@ class RangeAiding:
         state = self._drift + 1 + np.searchsorted(sats, self._epochs.sat) if sats else np.full(len(variance), -1)
         white, multipath = variance * (1 - options.multipath_share), variance * options.multipath_share
         return RangeNoise(white, rate, np.sqrt(multipath), state)
+
+    @property
+    def told_fixes(self) -> GnssFixSeries:
+        """The least-squares positions, for an alignment that weighs them."""
+        return self.fixes
 
     @property
     def t_ns(self) -> Times:

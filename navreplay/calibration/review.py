@@ -44,8 +44,8 @@ class Review:
     looks: int = 2
 
     def amend(self, options: FilterOptions, solution: Solution, amended: bool = False) -> Settled | None:
-        """Options that the innovations of a solution made with options ask for; None where they bear the told noise out. amended:
-        the options were asked for by a look before; then noise is not scaled down further."""
+        """Options that the innovations of a solution made with options ask for; None where they bear the told noise out.
+        amended: the options were asked for by a look before; then noise is not scaled down further."""
         factors: dict[str, float] = {}
         reasons = []
         for series in solution.innovations:

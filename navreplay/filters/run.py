@@ -1,4 +1,4 @@
-"""The epoch loop: inertial propagation to each measurement, then its update. There is no other."""
+"""A filter over a timeline: passes over its stretches, calibration before them, a look at the result behind."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -6,21 +6,23 @@ from typing import Any
 
 import numpy as np
 
+from navreplay.aiding.guidance import Guidance, choose_guidance
 from navreplay.aiding.ranges import RangeAiding
 from navreplay.calibration.linear_log import LinearLog
 from navreplay.calibration.review import Review
 from navreplay.calibration.settled import Settled, settle_nothing
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.filters.consider import Setup, check_considers, set_up
-from navreplay.filters.guidance import Guidance, choose_guidance
+from navreplay.filters.epochs import output_times, run_epochs
 from navreplay.filters.presets import Method
 from navreplay.filters.rows import Rows
-from navreplay.filters.stretches import cut_at_gaps, tell_unreached
 from navreplay.filters.trace import Traces
+from navreplay.filters.trial import settle_attitude
 from navreplay.filters.update import Estimator
-from navreplay.mechanisation.strapdown import Leg, NavState, Steps, idle_steps, make_steps
+from navreplay.mechanisation.strapdown import NavState, idle_steps, make_steps
 from navreplay.options import FilterOptions
 from navreplay.solution import Event, Solution
+from navreplay.start.stretches import cut_at_gaps, tell_unreached
 from navreplay.timeline import Floats, ImuSeries, LogError, Timeline, Times
 from navreplay.update.adapter import NoiseAdapter
 from navreplay.update.range_gate import RangeGate
@@ -29,9 +31,6 @@ from navreplay.update.record import Recorder
 __all__ = ["run_filter"]
 
 Progress = Callable[[float], None]
-
-_MOST_ROWS = 20_000_000
-_DAY_NS = 86_400 * 10**9
 
 
 def run_filter(timeline: Timeline, method: Method, options: FilterOptions, progress: Progress | None = None) -> Solution:
@@ -179,28 +178,38 @@ def _run_stretch(
     report: Callable[[int], None],
 ) -> list[Rows]:
     """The rows of a stretch: one part, or more where the filter lost its way and was started anew from the measurements."""
-    start_ns, state, cov = guidance.start(timeline, imu, options, recorder)
-    cov = setup.start_covariance(cov)
+    start_ns, state, cov = _start(timeline, guidance, imu, setup, options, recorder)
     aiding, end_ns = guidance.aiding, int(imu.t_ns[-1])
     parts = []
     while True:
         estimator = _traced(setup.estimator(guidance.gate(options.gate), recorder), guidance.model, aiding.t_ns, traces)
         epochs = np.flatnonzero((aiding.t_ns > start_ns) & (aiding.t_ns <= end_ns))
-        nodes = np.union1d(aiding.t_ns[epochs], _output_times(start_ns, end_ns, options.output_rate))
+        nodes = np.union1d(aiding.t_ns[epochs], output_times(start_ns, end_ns, options.output_rate))
         steps = make_steps(imu, np.append(nodes, start_ns)).after(start_ns)
-        rows = _run_epochs(steps, nodes, aiding.t_ns, epochs, state, cov, estimator, setup.model, options, report)
+        rows = run_epochs(steps, nodes, aiding.t_ns, epochs, state, cov, estimator, setup.model, options, report)
         parts.append(rows)
         lost_ns = int(rows.t_ns[-1])
         if not len(nodes) or lost_ns >= nodes[-1]:
             return parts
         try:
-            start_ns, state, cov = guidance.start(timeline, _rest_of(imu, lost_ns), options, recorder)
-            cov = setup.start_covariance(cov)
+            start_ns, state, cov = _start(timeline, guidance, _rest_of(imu, lost_ns), setup, options, recorder)
             text = "the filter kept contradicting its measurements; it is started anew from them"
         except LogError as error:
             start_ns, state, cov = lost_ns, NavState.unpack(rows.states[-1]), rows.covariances[-1]
             text = f"the filter keeps contradicting its measurements and could not be started anew: {error}"
         recorder.tell(lost_ns, "warning", text)
+
+
+def _start(
+    timeline: Timeline, guidance: Guidance, imu: ImuSeries, setup: Setup, options: FilterOptions, recorder: Recorder
+) -> tuple[int, NavState, Floats]:
+    """Time, state and covariance at which a stretch starts; where alignment is not sure of itself, as trials bear it out."""
+    start = guidance.start(timeline, imu, options, recorder)
+    cov = setup.start_covariance(start.cov)
+    if start.sure:
+        return start.t_ns, start.state, cov
+    state, cov = settle_attitude(guidance, imu, setup, options, recorder, start.t_ns, start.state, cov)
+    return start.t_ns, state, cov
 
 
 def _rest_of(imu: ImuSeries, t_ns: int) -> ImuSeries:
@@ -227,56 +236,6 @@ def _run_alone(
     start_ns, state, cov = aiding.start_alone()
     estimator = _traced(setup.estimator(RangeGate(options.gate), recorder), aiding.model, aiding.t_ns, traces)
     epochs = np.flatnonzero(aiding.t_ns > start_ns)
-    nodes = np.union1d(aiding.t_ns[epochs], _output_times(start_ns, int(aiding.t_ns[-1]), options.output_rate))
+    nodes = np.union1d(aiding.t_ns[epochs], output_times(start_ns, int(aiding.t_ns[-1]), options.output_rate))
     cov, steps = setup.start_covariance(cov), idle_steps(start_ns, nodes)
-    return _run_epochs(steps, nodes, aiding.t_ns, epochs, state, cov, estimator, setup.model, options, report)
-
-
-def _run_epochs(
-    steps: Steps,
-    nodes: Times,
-    t_ns: Times,
-    epochs: np.ndarray,
-    state: NavState,
-    cov: Floats,
-    estimator: Estimator,
-    model: ErrorModel,
-    options: FilterOptions,
-    report: Callable[[int], None],
-) -> Rows:
-    """From state and cov (n, n) at the beginning of the steps over all nodes (k,), with updates at t_ns[epochs]."""
-    ends = np.searchsorted(steps.t_ns, nodes) + 1
-    rows = Rows.allocate(np.concatenate([[steps.start_ns], nodes]).astype(np.int64), state, cov, options.smooth)
-
-    # each epoch ends a run of nodes; behind the last epoch one more run may follow, without a measurement
-    node, step = 0, 0
-    stops = (np.searchsorted(nodes, t_ns[epochs]) + 1).tolist()
-    for epoch, stop in zip([*epochs.tolist(), None], [*stops, len(nodes)], strict=True):
-        if stop > node:
-            leg = Leg(steps, step, ends[node:stop], options.covariance_interval, options.smooth)
-            moved = estimator.propagate(state, cov, leg)
-            rows.put(slice(node + 1, stop + 1), moved)
-            state, cov = NavState.unpack(moved.states[-1]), moved.covariances[-1]
-            node, step = stop, int(ends[stop - 1])
-        if epoch is not None:
-            updated = estimator.update(epoch, state, cov, steps.dtheta[step - 1], float(steps.dt[step - 1]))
-            rows.correct(node, updated)
-            state, cov = updated.state, updated.cov
-            report(int(t_ns[epoch]))
-            if updated.lost:
-                rows = rows.until(node)
-                break
-    return rows.smoothed(model) if options.smooth else rows
-
-
-def _output_times(start_ns: int, end_ns: int, rate: float) -> Times:
-    """Times of rows beside the epochs. Raises LogError where no memory would hold them."""
-    if rate <= 0:
-        return np.empty(0, dtype=np.int64)
-    period = round(1e9 / rate)
-    if (end_ns - start_ns) // period > _MOST_ROWS:
-        raise LogError(
-            f"filter: the measurements reach over {(end_ns - start_ns) / _DAY_NS:.4g} days, too long for rows at {rate:g} Hz; "
-            "are their stamps right (is the week another column)? Otherwise set output.rate_hz lower"
-        )
-    return np.arange((start_ns // period + 1) * period, end_ns + 1, period, dtype=np.int64)
+    return run_epochs(steps, nodes, aiding.t_ns, epochs, state, cov, estimator, setup.model, options, report)

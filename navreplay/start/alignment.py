@@ -29,7 +29,8 @@ class Alignment(NamedTuple):
 
     q_nb (4,) with cov_att (3, 3) of the rotation vector in n [rad^2], to which, where levelled, the tilt comes that the
     accelerometer biases cause. vel_n (3,) [m/s] with standard deviation vel_std, for a fix without velocity. gyro_bias (3,)
-    [rad/s] with standard deviation gyro_bias_std. text says what was done, warnings what to look at.
+    [rad/s] with standard deviation gyro_bias_std. text says what was done, warnings what to look at. sure: the attitude does
+    not rest on a course in motion, on an attitude that another sensor tells, or on nothing.
     """
 
     t_ns: int
@@ -43,6 +44,7 @@ class Alignment(NamedTuple):
     gyro_bias_std: float
     text: str
     warnings: tuple[str, ...]
+    sure: bool = True
 
 
 def align(sources: Sources) -> Alignment:
@@ -101,6 +103,7 @@ def _align_at_rest(sources: Sources, first: int, still_until: int, moving: np.nd
         *(t_ns, first, q_nb, cov_att, levelled, np.zeros(3), _VELOCITY_STD_AT_REST, bias, bias_std),
         f"aligned at rest, levelled over {seconds:.0f} s: {angles}",
         (heading.warning,) if heading.warning else (),
+        heading.sure,
     )
 
 
@@ -119,6 +122,7 @@ def _align_in_motion(sources: Sources, first: int) -> Alignment:
         *(t_ns, first, q_nb, cov_att, levelled, velocity, _VELOCITY_STD_IN_MOTION, np.zeros(3), sources.noise.gyro_bias_std),
         f"aligned in motion, levelled against {len(rows)} fixes: {angles}",
         (heading.warning,) if heading.warning else (),
+        options.method in ("given", "reference") or options.given is not None,
     )
 
 

@@ -19,12 +19,14 @@ _NEAR_NS = 2_000_000_000
 
 
 class Heading(NamedTuple):
-    """yaw [rad], its standard deviation [rad], where it came from, and a warning or an empty string."""
+    """yaw [rad], its standard deviation [rad], where it came from, a warning or an empty string, and whether nothing else need
+    be tried."""
 
     yaw: float
     std: float
     source: str
     warning: str = ""
+    sure: bool = True
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -68,7 +70,7 @@ def known_heading(sources: Sources, t_ns: int) -> Heading | None:
     q_nb, c_nf = attitude_nb(attitude, row, sources.fixes.lla[nearest_fix])
     variance = float(c_nf[2] @ attitude.cov[row] @ c_nf[2])
     std = float(np.sqrt(variance)) if np.isfinite(variance) else told_std
-    return Heading(float(rotation.euler_from_quat(q_nb)[2]), std, "the attitude channel")
+    return Heading(float(rotation.euler_from_quat(q_nb)[2]), std, "the attitude channel", sure=False)
 
 
 def _nearest(t_ns: int, times: Times) -> int:

@@ -78,7 +78,8 @@ class Gate:
         """Counts an epoch of a kind; whether the kind has been shut out too long."""
         run = self._runs.get(kind, _Run())
         if not failed:
-            self._runs[kind] = _Run(run.agreed + 1)
+            # behind a long run of failures agreement begins anew: the last ones may have been right
+            self._runs[kind] = _Run(1 if run.epochs >= self._options.reset_after > 0 else run.agreed + 1)
             return False
         run = run._replace(epochs=run.epochs + 1, start_ns=run.start_ns if run.epochs else t_ns)
         self._runs[kind] = run

@@ -23,7 +23,17 @@ from navreplay.update.range_gate import RangeGate
 from navreplay.update.record import Recorder
 from navreplay.update.verdict import EpochGate
 
-__all__ = ["Guidance", "choose_guidance"]
+__all__ = ["Guidance", "Start", "choose_guidance"]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Start:
+    """Time, state and covariance (n, n) at which a stretch starts. sure: by something better than a course or a guess."""
+
+    t_ns: int
+    state: NavState
+    cov: Floats
+    sure: bool
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -46,20 +56,20 @@ class Guidance:
         main: EpochGate = RangeGate(options) if isinstance(self.main, RangeAiding) else Gate(options)
         return JointGate(main, [(other.kinds, other.gate(options)) for other in self.others]) if self.others else main
 
-    def start(
-        self, timeline: Timeline, imu: ImuSeries, options: FilterOptions, recorder: Recorder
-    ) -> tuple[int, NavState, Floats]:
-        """Time, state and covariance (n, n) at which a stretch of the IMU starts; the record tells how. Raises LogError."""
+    def start(self, timeline: Timeline, imu: ImuSeries, options: FilterOptions, recorder: Recorder) -> Start:
+        """Where a stretch of the IMU starts; the record tells how. Raises LogError."""
         if isinstance(self.main, AttitudeAiding):
             told = start_as_told(timeline, imu, self.inertial, options)
             recorder.tell(told.t_ns, "info", told.text)
-            return told.t_ns, told.state, told.cov
-        sources = Sources(imu, self.main.fixes, timeline.attitude, timeline.reference, options.imu_noise, options.alignment)
+            return Start(told.t_ns, told.state, told.cov, True)
+        sources = Sources(
+            imu, self.main.told_fixes, timeline.attitude, timeline.reference, options.imu_noise, options.alignment
+        )
         alignment = align(sources)
         recorder.tell(alignment.t_ns, "info", alignment.text)
         for warning in alignment.warnings:
             recorder.tell(alignment.t_ns, "warning", warning)
-        return alignment.t_ns, *self.main.start(alignment)
+        return Start(alignment.t_ns, *self.main.start(alignment), alignment.sure)
 
 
 def choose_guidance(timeline: Timeline, options: FilterOptions, recorder: Recorder) -> Guidance:
