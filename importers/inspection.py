@@ -178,7 +178,7 @@ def _describe(
 
 def _times(log: Log, channel: Channel, table: Table, role: str | None, settings: InputSettings) -> Times:
     by_role: dict[str, ImuInput | FixInput | AttitudeInput | ReferenceInput]
-    by_role = {"imu": settings.imu, "attitude": settings.attitude, "reference": settings.reference}
+    by_role = {"imu": settings.imu, "accel": settings.imu, "attitude": settings.attitude, "reference": settings.reference}
     if role == "time" or len(table.log_time_ns) == 0:
         return np.sort(gps_from_utc(table.log_time_ns, leap_seconds(settings.leap_seconds)))
     source = Source(log.path, channel, table, role or "unused")

@@ -9,6 +9,7 @@ import numpy as np
 from importers.conversion.attitudes import convert_attitude
 from importers.conversion.fixes import convert_fixes
 from importers.conversion.imu import convert_imu
+from importers.conversion.imu_pair import join_accelerations
 from importers.conversion.ranges import convert_ranges
 from importers.conversion.reference import convert_reference, reference_from_fixes
 from importers.formats import open_log
@@ -68,7 +69,12 @@ def build_timeline(
     recognised: dict[str, str] = {}
     imu = fixes = ranges = attitude = trajectory = None
     if "imu" in sources:
-        imu, told, assumed, found = convert_imu(join_sources(sources["imu"], settings.imu, clock), settings.imu)
+        joined = join_sources(sources["imu"], settings.imu, clock)
+        if "accel" in sources:
+            forces = join_sources(sources["accel"], settings.imu, clock)
+            joined, told = join_accelerations(joined, forces, settings.imu.accel_channel is not None)
+            uses += told
+        imu, told, assumed, found = convert_imu(joined, settings.imu)
         uses, notes, recognised = [*uses, *told], [*notes, *assumed], recognised | found
     if "fix" in sources or "velocity" in sources:
         position, velocity = (join_sources(sources[role], settings.fix, clock) if role in sources else None for role in _GNSS)

@@ -1,7 +1,7 @@
 """Which channel serves which purpose: by type where that is unambiguous, by the settings otherwise."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from importers.roles.messages import kind_of
@@ -13,6 +13,7 @@ __all__ = ["NOTHING", "SETTING", "Choice", "always_used", "candidates", "choose_
 
 SETTING = {
     "imu": "input.imu.channel",
+    "accel": "input.imu.accel_channel",
     "fix": "input.fix.channel",
     "velocity": "input.fix.velocity_channel",
     "range": "input.range.channel",
@@ -20,6 +21,11 @@ SETTING = {
     "reference": "input.reference.channel",
 }
 """The setting that names the channel of a role."""
+_RATES_AND_FORCES = (
+    ("gyroscope", "accelerometer"),
+    ("gyro", "accel"),
+    ("angular_velocity", "linear_acceleration"),
+)
 NOTHING = "none"
 """In place of a channel's name: no channel is to serve."""
 
@@ -55,6 +61,7 @@ def named_channel(settings: InputSettings, role: str) -> str | None:
     """The channel that the settings name for a role; None where they name none, or the role needs no choice."""
     return {
         "imu": settings.imu.channel,
+        "accel": settings.imu.accel_channel,
         "fix": settings.fix.channel,
         "velocity": settings.fix.velocity_channel,
         "range": settings.range.channel,
@@ -75,9 +82,12 @@ def choose_role(logs: Sequence[Log], settings: InputSettings, reference: Log | N
     name = named_channel(settings, role)
     if name == NOTHING:
         return []
+    if role == "accel":
+        return _accelerations(logs, name, choose_role(logs, settings, reference, "imu"))
     if name is not None:
         return _named(logs, role, name)
-    return _only_one(_foremost([choice for choice in candidates(logs, role) if _automatic(choice.channel, role)]), role)
+    found = _foremost([choice for choice in candidates(logs, role) if _automatic(choice.channel, role)])
+    return _only_one(_without_accelerations(found) if role == "imu" else found, role)
 
 
 def _foremost(choices: list[Choice]) -> list[Choice]:
@@ -90,7 +100,32 @@ def _foremost(choices: list[Choice]) -> list[Choice]:
 
 def _rank(choice: Choice) -> int:
     kind = kind_of(choice.channel)
-    return 0 if kind is None else kind.rank
+    return choice.channel.rank + (0 if kind is None else kind.rank)
+
+
+def _accelerations(logs: Sequence[Log], name: str | None, imu: Sequence[Choice]) -> list[Choice]:
+    """The channel of accelerations beside that of the inertial sensor: the one named, or the one whose name differs just in
+    that (``camera/gyro/sample``, ``camera/accel/sample``)."""
+    if name is not None:
+        return [replace(choice, role="accel") for choice in _named(logs, "imu", name, "accel")]
+    wanted = {other for choice in imu if (other := _beside_rates(choice.channel.name)) is not None}
+    found = [choice for choice in candidates(logs, "imu") if choice.channel.name in wanted]
+    return [replace(choice, role="accel") for choice in found]
+
+
+def _without_accelerations(found: list[Choice]) -> list[Choice]:
+    """The channels, without those of accelerations that stand beside one of rates."""
+    names = {choice.channel.name for choice in found}
+    beside = {_beside_rates(name) for name in names}
+    return [choice for choice in found if choice.channel.name not in beside]
+
+
+def _beside_rates(name: str) -> str | None:
+    """The name that a channel of accelerations would have beside one of angular rates; None for another name."""
+    for rates, forces in _RATES_AND_FORCES:
+        if rates in name:
+            return name.replace(rates, forces)
+    return None
 
 
 def _automatic(channel: Channel, role: str) -> bool:
@@ -114,18 +149,18 @@ def _choose_reference(logs: Sequence[Log], name: str | None, reference: Log | No
     return _only_one(_foremost(meant or absolute or found), "reference")
 
 
-def _named(logs: Sequence[Log], role: str, name: str) -> list[Choice]:
+def _named(logs: Sequence[Log], role: str, name: str, setting: str = "") -> list[Choice]:
     found = [Choice(log, channel, role) for log in logs for channel in log.channels() if channel.name == name]
     place = ", ".join(Path(log.path).name for log in logs)
     if not found:
         there = ", ".join(channel.name for log in logs for channel in log.channels()) or "no channel at all"
-        raise LogError(f"{place}: has no channel {name}, which {SETTING[role]} names; there is {there}")
+        raise LogError(f"{place}: has no channel {name}, which {SETTING[setting or role]} names; there is {there}")
     for choice in found:
         kind = kind_of(choice.channel)
         if kind is None or role not in kind.roles:
             could = ", ".join(sorted({other.channel.name for other in candidates(logs, role)})) or "none"
             raise LogError(
-                f"{place}: channel {name} is {choice.channel.type}, which cannot serve as {role} ({SETTING[role]}); "
+                f"{place}: channel {name} is {choice.channel.type}, which cannot serve as {role} ({SETTING[setting or role]}); "
                 f"channels that can: {could}"
             )
     return found
