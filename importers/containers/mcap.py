@@ -21,7 +21,7 @@ from importers.containers.mcap_records import (
 from importers.containers.record_file import RecordFile
 from importers.containers.record_walk import Walk
 from importers.decoding.blocks import Block, Buffer, Decoder, Loss, Offsets
-from importers.decoding.channel_reading import read_tables, require_channels
+from importers.decoding.channel_reading import name_numbers, read_tables, require_channels
 from importers.rows.log import Channel, Table
 from navreplay.timeline import LogError
 
@@ -54,7 +54,7 @@ class McapLog:
         return self._file.notes
 
     def channels(self) -> tuple[Channel, ...]:
-        """See `Log`. Channel numbers of one topic are one channel; its type is that of the first."""
+        """See `Log`; `name_numbers` tells which channel numbers are one channel."""
         counts = self._directory.counts
         channels = []
         for name, numbers in self._numbers().items():
@@ -71,10 +71,8 @@ class McapLog:
         return read_tables(wanted, self._decoder, self._messages, self._directory.counts)
 
     def _numbers(self) -> dict[str, list[int]]:
-        numbers: dict[str, list[int]] = {}
-        for number, channel in self._directory.channels.items():
-            numbers.setdefault(channel.topic, []).append(number)
-        return numbers
+        channels = self._directory.channels
+        return name_numbers((number, channel.topic, self._type(number)) for number, channel in channels.items())
 
     def _type(self, number: int) -> str:
         channel = self._directory.channels[number]

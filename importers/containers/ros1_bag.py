@@ -10,7 +10,7 @@ from importers.containers.compression import DamagedDataError
 from importers.containers.record_file import RecordFile
 from importers.containers.record_walk import Walk
 from importers.decoding.blocks import Block, Buffer, Decoder, Loss
-from importers.decoding.channel_reading import read_tables, require_channels
+from importers.decoding.channel_reading import name_numbers, read_tables, require_channels
 from importers.rows.log import Channel, Table
 from navreplay.timeline import LogError
 
@@ -39,7 +39,7 @@ class Ros1Bag:
         return self._file.notes
 
     def channels(self) -> tuple[Channel, ...]:
-        """See `Log`. Connections of one topic are one channel; its type is that of the first."""
+        """See `Log`; `name_numbers` tells which connections are one channel."""
         directory = self._directory
         return tuple(
             Channel(
@@ -59,10 +59,8 @@ class Ros1Bag:
         return read_tables(wanted, self._decoder, self._messages, self._directory.counts)
 
     def _numbers(self) -> dict[str, list[int]]:
-        numbers: dict[str, list[int]] = {}
-        for number, connection in self._directory.connections.items():
-            numbers.setdefault(connection.topic, []).append(number)
-        return numbers
+        connections = self._directory.connections
+        return name_numbers((number, connection.topic, connection.type) for number, connection in connections.items())
 
     def _decoder(self, number: int) -> Decoder:
         from importers.decoding.ros import RosDecoder

@@ -9,7 +9,7 @@ from importers.decoding.blocks import Block, Buffer, Decoded, Decoder, Loss, Off
 from importers.rows.log import Channel, Table
 from navreplay.timeline import LogError
 
-__all__ = ["read_tables", "require_channels"]
+__all__ = ["name_numbers", "read_tables", "require_channels"]
 
 _LISTED = 12
 
@@ -22,6 +22,17 @@ def require_channels(path: str, names: Sequence[str], channels: Sequence[Channel
             near = get_close_matches(name, known, n=1)
             hint = f"did you mean {near[0]}?" if near else "it has " + (", ".join(known[:_LISTED]) or "no channels at all")
             raise LogError(f"{path}: no channel {name} in this log; {hint}")
+
+
+def name_numbers(channels: Iterable[tuple[int, str, str]]) -> dict[str, list[int]]:
+    """The container's numbers by channel name, of number, topic and type: those of one topic and type are one channel, named as
+    the topic; another type on the same topic is a channel of its own, ``topic#type``."""
+    first: dict[str, str] = {}
+    numbers: dict[str, list[int]] = {}
+    for number, topic, type in channels:
+        same = first.setdefault(topic, type) == type
+        numbers.setdefault(topic if same else f"{topic}#{type or 'unknown'}", []).append(number)
+    return numbers
 
 
 def read_tables(

@@ -24,15 +24,17 @@ ESF_NOTE = (
 _FEWEST = 10
 
 
-def esf_samples(table: Table, leap: LeapSeconds, place: str) -> Table:
+def esf_samples(table: Table, leap: LeapSeconds) -> Table:
     """Samples of angular rate [rad/s] and specific force [m/s^2] in the axes of the sensor, one per tick of the gyroscope.
-    Raises LogError, naming place, where there are too few to tie them to a clock."""
+    Raises LogError where there are too few to tie them to a clock, or fields are missing."""
     columns = either_spelling(table.columns)
+    if "blocks" not in columns and not columns.keys() >= {"data", "time_tag"}:
+        raise LogError(f"its messages have neither blocks nor time_tag and data, but {', '.join(columns)}")
     message, tick, word = _words(columns)
     stamps = np.asarray(columns.get("header.stamp", table.log_time_ns), dtype=np.int64)
     tick = unwrapped_ticks(tick)
     if len(np.unique(tick)) < _FEWEST:
-        raise LogError(f"{place}: only {len(np.unique(tick))} samples of the inertial sensor; too few to time them")
+        raise LogError(f"only {len(np.unique(tick))} samples of the inertial sensor; too few to time them")
     first = int(stamps[0])
     slope, offset = np.polyfit(tick.astype(float), (stamps[message] - first).astype(float), 1)
     start = int(gps_from_utc(np.array([first + round(float(offset))]), leap)[0])
@@ -41,7 +43,7 @@ def esf_samples(table: Table, leap: LeapSeconds, place: str) -> Table:
 
 
 def _words(columns: Any) -> tuple[NDArray[np.intp], NDArray[np.int64], NDArray[np.int64]]:
-    """For every datum: its message, its tick, and its word (type in the upper 8 bits). Raises KeyError."""
+    """For every datum: its message, its tick, and its word (type in the upper 8 bits)."""
     rows = []
     if "blocks" in columns:
         for message, blocks in enumerate(columns["blocks"].tolist()):

@@ -13,13 +13,14 @@ from importers.roles.nmea_messages import sentence_fixes
 from importers.rows.log import Channel, Log, Table
 from importers.settings import MessageMapping
 from navreplay.geodesy.time_scales import LeapSeconds
+from navreplay.timeline import LogError
 
 __all__ = ["CONVERTED", "MappedLog"]
 
 _FIRST_RANK = 1
 _LAST_RANK = 9
 
-Conversion = Callable[[Table, LeapSeconds, str], Table]
+Conversion = Callable[[Table, LeapSeconds], Table]
 CONVERTED: Mapping[str, tuple[Conversion, str, str]] = {
     "nmea_msgs/Sentence": (sentence_fixes, "nmea", ""),
     "ublox_msgs/EsfRAW": (esf_samples, "message/imu_si", ESF_NOTE),
@@ -76,7 +77,7 @@ class MappedLog:
         return tuple(self._channels)
 
     def read(self, names: tuple[str, ...]) -> dict[str, Table]:
-        """See `Log`. Raises LogError where a mapping of the configuration names a field that the messages do not have."""
+        """See `Log`. Where a mapping names a field that the messages do not have, they are rejected for that."""
         require_channels(self.path, names, self._channels)
         beside = {name: self._beside(name) for name in names if name in self._mapped}
         wanted = [self._mapped[name][0].name if name in self._mapped else name for name in names]
@@ -95,17 +96,26 @@ class MappedLog:
         return {types[other.type]: other.name for other in self._log.channels() if other.type in types}
 
     def _map(self, name: str, table: Table, beside: Mapping[str, Table]) -> Table:
+        """The table by its mapping; where that does not fit, every message is rejected for it."""
         if len(table.log_time_ns) == 0:
             return table
+        try:
+            return self._mapped_table(name, table, beside)
+        except LogError as error:
+            rejected = dict(table.rejected) | {str(error): len(table.log_time_ns)}
+            return Table(np.empty(0, dtype=np.int64), {}, table.read, rejected)
+
+    def _mapped_table(self, name: str, table: Table, beside: Mapping[str, Table]) -> Table:
+        """Raises LogError where the mapping does not fit the messages."""
         if name not in self._mapped:
             type = next(channel.type for channel in self._channels if channel.name == name).replace("/msg/", "/")
             conversion = CONVERTED.get(type)
-            return table if conversion is None else conversion[0](table, self._leap, f"{self.path}: {name}")
+            return table if conversion is None else conversion[0](table, self._leap)
         channel, variants, told = self._mapped[name]
         joined = _joined(table, beside, variants[0].key)
         mapping = next((variant for variant in variants if fits_fields(joined, variant)), variants[0])
-        source = "the mapping [[input.message]] for" if told else "what is known of"
-        return map_table(joined, mapping, self._leap, f"{self.path}: {source} {channel.name} ({channel.type})")
+        source = "the mapping [[input.message]]" if told else f"what is known of {channel.type}"
+        return map_table(joined, mapping, self._leap, source)
 
 
 def _fits(channel: Channel, mapping: MessageMapping) -> bool:

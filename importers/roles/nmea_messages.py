@@ -7,13 +7,16 @@ import numpy as np
 from importers.rows.log import Table
 from importers.text.nmea import read_sentences
 from navreplay.geodesy.time_scales import LeapSeconds
+from navreplay.timeline import LogError
 
 __all__ = ["sentence_fixes"]
 
 
-def sentence_fixes(table: Table, leap: LeapSeconds, place: str) -> Table:
-    """The fixes in the sentences of all messages; where no sentence has a date, the recorder's clock tells it. Raises LogError,
-    naming place, where there is no position among them."""
+def sentence_fixes(table: Table, leap: LeapSeconds) -> Table:
+    """The fixes in the sentences of all messages; where no sentence has a date, the recorder's clock tells it. Raises LogError
+    where there is no position among them."""
+    if "sentence" not in table.columns:
+        raise LogError(f"its messages have no field 'sentence', but {', '.join(table.columns)}")
     lines = [str(sentence).strip() for sentence in table.columns["sentence"].tolist()]
     day = datetime.fromtimestamp(int(np.min(table.log_time_ns)) / 1e9, tz=UTC).date()
-    return read_sentences(place, "\n".join(lines).encode() + b"\n", day, leap)
+    return read_sentences("the sentences", "\n".join(lines).encode() + b"\n", day, leap)

@@ -83,7 +83,7 @@ def choose_role(logs: Sequence[Log], settings: InputSettings, reference: Log | N
     if name == NOTHING:
         return []
     if role == "accel":
-        return _accelerations(logs, name, choose_role(logs, settings, reference, "imu"))
+        return _accelerations(logs, name, settings.imu.channel)
     if name is not None:
         return _named(logs, role, name)
     found = _foremost([choice for choice in candidates(logs, role) if _automatic(choice.channel, role)])
@@ -103,14 +103,15 @@ def _rank(choice: Choice) -> int:
     return choice.channel.rank + (0 if kind is None else kind.rank)
 
 
-def _accelerations(logs: Sequence[Log], name: str | None, imu: Sequence[Choice]) -> list[Choice]:
-    """The channel of accelerations beside that of the inertial sensor: the one named, or the one whose name differs just in
-    that (``camera/gyro/sample``, ``camera/accel/sample``)."""
+def _accelerations(logs: Sequence[Log], name: str | None, imu: str | None) -> list[Choice]:
+    """The channel of accelerations: the one named, or the one whose name differs from that of the inertial sensor just in that
+    (``camera/gyro/sample``, ``camera/accel/sample``)."""
     if name is not None:
         return [replace(choice, role="accel") for choice in _named(logs, "imu", name, "accel")]
-    wanted = {other for choice in imu if (other := _beside_rates(choice.channel.name)) is not None}
-    found = [choice for choice in candidates(logs, "imu") if choice.channel.name in wanted]
-    return [replace(choice, role="accel") for choice in found]
+    sensors = candidates(logs, "imu")
+    names = {choice.channel.name for choice in sensors} if imu is None else {imu}
+    beside = {_beside_rates(other) for other in names}
+    return [replace(choice, role="accel") for choice in sensors if choice.channel.name in beside]
 
 
 def _without_accelerations(found: list[Choice]) -> list[Choice]:
@@ -150,26 +151,29 @@ def _choose_reference(logs: Sequence[Log], name: str | None, reference: Log | No
 
 
 def _named(logs: Sequence[Log], role: str, name: str, setting: str = "") -> list[Choice]:
-    found = [Choice(log, channel, role) for log in logs for channel in log.channels() if channel.name == name]
-    place = ", ".join(Path(log.path).name for log in logs)
-    if not found:
+    """The channel of a name; of those that share its topic (``topic#...``) the ones that can serve."""
+    same = [Choice(log, channel, role) for log in logs for channel in log.channels() if name in (channel.name, _topic(channel))]
+    found = [choice for choice in same if (kind := kind_of(choice.channel)) is not None and role in kind.roles]
+    if found:
+        return found
+    place, key = ", ".join(Path(log.path).name for log in logs), SETTING[setting or role]
+    if not same:
         there = ", ".join(channel.name for log in logs for channel in log.channels()) or "no channel at all"
-        raise LogError(f"{place}: has no channel {name}, which {SETTING[setting or role]} names; there is {there}")
-    for choice in found:
-        kind = kind_of(choice.channel)
-        if kind is None or role not in kind.roles:
-            could = ", ".join(sorted({other.channel.name for other in candidates(logs, role)})) or "none"
-            raise LogError(
-                f"{place}: channel {name} is {choice.channel.type}, which cannot serve as {role} ({SETTING[setting or role]}); "
-                f"channels that can: {could}"
-            )
-    return found
+        raise LogError(f"{place}: has no channel {name}, which {key} names; there is {there}")
+    could = ", ".join(sorted({other.channel.name for other in candidates(logs, role)})) or "none"
+    raise LogError(
+        f"{place}: channel {name} is {same[0].channel.type}, which cannot serve as {role} ({key}); channels that can: {could}"
+    )
+
+
+def _topic(channel: Channel) -> str:
+    return channel.name.partition("#")[0]
 
 
 def _only_one(found: list[Choice], role: str) -> list[Choice]:
-    """One channel, which may continue from file to file under the same name and type."""
+    """One channel, which may continue from file to file under the same name and type, or on its topic with another type."""
     names = {(choice.channel.name, choice.channel.type) for choice in found}
-    if len(names) > 1:
+    if len(names) > 1 and len({_topic(choice.channel) for choice in found}) > 1:
         listed = "; ".join(f"{name} ({type})" for name, type in sorted(names))
         example = sorted(names)[0][0]
         raise LogError(

@@ -100,11 +100,11 @@ def account(joined: Joined, screening: Screening) -> tuple[ChannelUse, ...]:
 def _extract(source: Source) -> Rows:
     kind = kind_of(source.channel)
     assert kind is not None
+    if len(source.table.log_time_ns) == 0:
+        return Rows()
     try:
         return kind.rows(either_spelling(source.table.columns))
     except KeyError as error:
-        if len(source.table.log_time_ns) == 0:
-            raise _nothing_readable(source) from error
         raise LogError(
             f"{source.file}: channel {source.channel.name} says it is {source.channel.type} but has no field {error.args[0]}"
         ) from error
@@ -131,7 +131,8 @@ def _concatenate(rows: Sequence[Rows]) -> Rows:
         if known is not None:
             parts = [_unknown(known, n) if value is None else value for value, n in zip(values, lengths, strict=True)]
             arrays[field.name] = np.concatenate(parts)
-    return replace(rows[0], **arrays)
+    filled = next((part for part, n in zip(rows, lengths, strict=True) if n), rows[0])
+    return replace(filled, **arrays)
 
 
 def _length(rows: Rows) -> int:

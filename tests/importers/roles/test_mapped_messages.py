@@ -237,6 +237,34 @@ def test_one_message_of_several_sensors(tmp_path: Path) -> None:
     assert np.allclose(np.degrees(timeline.reference.lla[:, 0]), LAT)
 
 
+@pytest.mark.parametrize("second", ["gps_msgs/msg/GPSFix", "nmea_msgs/msg/Sentence"])
+def test_one_topic_with_two_types(tmp_path: Path, second: str) -> None:
+    from mcap.writer import Writer
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    for name, text in (definitions_of("gps_msgs") | definitions_of("nmea_msgs")).items():
+        store.register(get_types_from_msg(text, name))
+    with (tmp_path / "log.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        for part, kind in enumerate(("sensor_msgs/msg/NavSatFix", second)):
+            schema = writer.register_schema(kind, "ros2msg", store.generate_msgdef(kind, ros_version=2)[0].encode())
+            channel = writer.register_channel("/fix", "cdr", schema)
+            for i in range(N):
+                t_ns = START_NS + (part * N + i) * 10**8
+                stamp = {"header.stamp.sec": t_ns // 10**9, "header.stamp.nanosec": t_ns % 10**9}
+                values = {"latitude": LAT, "longitude": LON, "altitude": HEIGHT, "speed": 2.0, "err_speed": 0.1} | stamp
+                writer.add_message(channel, t_ns, bytes(store.serialize_cdr(filled(store, kind, values), kind)), t_ns)
+        writer.finish()
+    log = open_log(tmp_path / "log.mcap")
+    assert [channel.name for channel in log.channels()] == ["/fix", f"/fix#{second}"]
+    for channel in (None, "/fix"):
+        timeline = load_timeline([tmp_path / "log.mcap"], InputSettings.model_validate({"fix": {"channel": channel}}))
+        assert timeline.fixes is not None
+        assert len(timeline.fixes) == (2 * N if "GPSFix" in second else N)
+        assert np.allclose(np.degrees(timeline.fixes.lla[:, 0]), LAT)
+
+
 def test_a_mapping_of_the_configuration_goes_first(tmp_path: Path) -> None:
     kind = "px4_msgs/msg/SensorGps"
     values = {"latitude_deg": LAT, "longitude_deg": LON, "altitude_msl_m": 7.0, "altitude_ellipsoid_m": HEIGHT}
