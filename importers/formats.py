@@ -235,6 +235,14 @@ def _open_sbf(path: str, head: bytes, settings: InputSettings) -> Log | None:
     return open_sbf(path) if is_sbf(head) else None
 
 
+def _open_rtcm(path: str, head: bytes, settings: InputSettings) -> Log | None:
+    if b"\xd3" not in head:
+        return None
+    from importers.receivers.rtcm import is_rtcm, open_rtcm
+
+    return open_rtcm(path, settings.gps_week) if is_rtcm(head) else None
+
+
 def _open_ulog(path: str, head: bytes, settings: InputSettings) -> Log | None:
     if not head.startswith(b"ULog\x01\x12\x35"):
         return None
@@ -295,6 +303,7 @@ FORMATS: tuple[Format, ...] = (
         _open_novatel,
     ),
     Format("sbf", "Septentrio SBF: MeasEpoch, PVTGeodetic, ExtSensorMeas, INSNavGeod ...", (".sbf",), _open_sbf),
+    Format("rtcm", "RTCM 3 stream: MSM4 to MSM7, ephemerides", (".rtcm", ".rtcm3"), _open_rtcm),
     Format("ulog", "flight log of PX4 (ULog)", (".ulg",), _open_ulog),
     Format("dataflash", "flight log of ArduPilot (DataFlash)", (".bin",), _open_dataflash),
     Format("csv", "any table of numbers, or matrix of a MATLAB file, by [[input.csv]]", (".csv", ".txt", ".mat"), _open_mapped),

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from importers.decoding.blocks import Buffer, Offsets
 
-__all__ = ["CRC16_CCITT", "CRC32", "scan_novatel", "scan_sbf"]
+__all__ = ["CRC16_CCITT", "CRC24Q", "CRC32", "scan_novatel", "scan_rtcm", "scan_sbf"]
 
 
 def _table(polynomial: int, width: int, reflected: bool) -> NDArray[np.uint32]:
@@ -26,6 +26,7 @@ def _table(polynomial: int, width: int, reflected: bool) -> NDArray[np.uint32]:
 CRC32 = _table(0xEDB88320, 32, True)
 """Of NovAtel's messages, which begin with 0 and end without inversion."""
 CRC16_CCITT = _table(0x1021, 16, False)
+CRC24Q = _table(0x864CFB, 24, False)
 
 
 @njit(cache=True)
@@ -110,3 +111,35 @@ def scan_sbf(
         count += 1
         free = place + length
     return at[:count].copy(), size[:count].copy(), number[:count].copy(), wrong
+
+
+@njit(cache=True)
+def _crc24(buffer: Buffer, begin: int, stop: int, table: NDArray[np.uint32]) -> int:
+    value = np.uint32(0)
+    for at in range(begin, stop):
+        index = ((value >> np.uint32(16)) ^ np.uint32(buffer[at])) & np.uint32(255)
+        value = np.uint32(((value << np.uint32(8)) & np.uint32(0xFFFFFF)) ^ table[index])
+    return np.int64(value)
+
+
+@njit(cache=True)
+def scan_rtcm(buffer: Buffer, candidates: Offsets, table: NDArray[np.uint32]) -> tuple[Offsets, NDArray[np.int64], int]:
+    """Frames (D3, 6 bits of zero, 10 bits of length, content, 24 bits of checksum) among candidates (k,), ascending. Returns
+    offset (n,) and length (n,) of whole frames, and how many candidates had a wrong checksum."""
+    room = len(candidates)
+    at, size = np.empty(room, np.int64), np.empty(room, np.int64)
+    count, wrong, free = 0, 0, 0
+    for place in candidates:
+        if place < free or place + 6 > len(buffer):
+            continue
+        stop = place + 3 + ((np.int64(buffer[place + 1]) & 3) << 8) + np.int64(buffer[place + 2])
+        if stop < place + 5 or stop + 3 > len(buffer):
+            continue
+        stated = np.int64(buffer[stop]) << 16 | np.int64(buffer[stop + 1]) << 8 | np.int64(buffer[stop + 2])
+        if _crc24(buffer, place, stop, table) != stated:
+            wrong += 1
+            continue
+        at[count], size[count] = place, stop + 3 - place
+        count += 1
+        free = stop + 3
+    return at[:count].copy(), size[:count].copy(), wrong

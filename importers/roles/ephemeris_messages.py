@@ -70,6 +70,7 @@ def _ionosphere(table: Table, near_ns: int, leap: LeapSeconds) -> tuple[Ephemeri
 
 EPHEMERIS_TYPES: Mapping[str, Reader] = {
     "rinex/navigation": _rinex,
+    "rtcm/ephemerides": _rinex,
     "sp3": _sp3,
     "ubx/RXM-SFRBX": _words,
     "ublox_msgs/RxmSFRBX": _words,

@@ -95,6 +95,7 @@ RANGE_TYPES: Mapping[str, Callable[[Table], Table]] = {
     "ubx/RXM-RAWX": _as_they_are,
     "novatel/RANGE": _as_they_are,
     "sbf/MeasEpoch": _as_they_are,
+    "rtcm/MSM": _as_they_are,
     "navreplay.GnssRanges": _own,
     "gnss_comm/GnssMeasMsg": gnss_comm_ranges,
     "gnss_comm_msgs/GnssMeasMsg": gnss_comm_ranges,
