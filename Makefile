@@ -1,7 +1,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test benchmark clean
+.PHONY: demo test docs benchmark clean
 
 demo: .venv/.installed
 	$(BIN)/navreplay run examples/drive_0708/drive_0708.mcap -c examples/drive_0708/drive.toml -o out/drive_0708 --force
@@ -13,13 +13,17 @@ test: .venv/.tested
 	$(BIN)/lint-imports
 	$(BIN)/python -m pytest -n 2
 
+docs: .venv/.documented
+	$(BIN)/mkdocs build --strict --quiet
+	@echo "site/index.html"
+
 benchmark: .venv/.tested
 	$(BIN)/python benchmarks/import_speed.py
 	$(BIN)/python benchmarks/run_speed.py
 	$(BIN)/python benchmarks/method_speed.py
 
 clean:
-	rm -rf .venv out build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis .import_linter_cache
+	rm -rf .venv out build dist site *.egg-info .pytest_cache .ruff_cache .mypy_cache .hypothesis .import_linter_cache
 
 # The installation is editable, so only a change of the requirements calls for another one.
 .venv/.installed: pyproject.toml | .venv
@@ -31,6 +35,10 @@ clean:
 	@echo "Installing navreplay and what its tests need into .venv ..."
 	$(BIN)/python -m pip install -qq --disable-pip-version-check -e ".[test]"
 	touch $@ .venv/.installed
+
+.venv/.documented: pyproject.toml | .venv
+	$(BIN)/python -m pip install -qq --disable-pip-version-check -e ".[docs]"
+	touch $@
 
 .venv:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \

@@ -30,9 +30,10 @@ from importers.trajectories.gpx import is_gpx, read_gpx
 from importers.trajectories.sbet import is_sbet, read_sbet
 from importers.ublox.stream import UbxLog, is_ubx
 from navreplay.geodesy.time_scales import LEAP_SECONDS
+from navreplay.plugins import load_plugins
 from navreplay.timeline import LogError
 
-__all__ = ["FORMATS", "Format", "open_log"]
+__all__ = ["FORMATS", "Format", "known_formats", "open_log"]
 
 _HEAD_BYTES = 20_000
 _FAR_BYTES = 4_000_000
@@ -48,6 +49,14 @@ class Format:
     description: str
     extensions: tuple[str, ...]
     open: Callable[[str, bytes, InputSettings], Log | None]
+
+
+def known_formats() -> tuple[Format, ...]:
+    """All formats in the order in which they are tried: those here, and behind them those that other packages register under
+    `navreplay.formats`. Raises LogError for a plug-in that cannot be loaded."""
+    names = {known.name for known in FORMATS}
+    plugins = (known for known in load_plugins("navreplay.formats", Format) if isinstance(known, Format))
+    return (*FORMATS, *(known for known in plugins if known.name not in names))
 
 
 def open_log(path: str | Path, settings: InputSettings | None = None) -> Log:
@@ -84,7 +93,7 @@ def _with_plain_names(settings: InputSettings, packed: str, plain: str) -> Input
 
 
 def _open_plain(name: str, head: bytes, settings: InputSettings) -> Log:
-    for known in FORMATS:
+    for known in known_formats():
         log = known.open(name, head, settings)
         if log is not None:
             return log
@@ -100,7 +109,7 @@ def _open_plain(name: str, head: bytes, settings: InputSettings) -> Log:
             "ephemerides from a navigation file"
         )
     raise LogError(
-        f"{name}: unknown format; by its content it is none of {', '.join(known.name for known in FORMATS)}. "
+        f"{name}: unknown format; by its content it is none of {', '.join(known.name for known in known_formats())}. "
         "A table of numbers needs an [[input.csv]] entry that names its columns"
     )
 

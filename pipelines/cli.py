@@ -55,17 +55,7 @@ def _build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    for add in (
-        _add_inspect,
-        _add_init,
-        _add_run,
-        _add_compare,
-        _add_synth,
-        _add_experiment,
-        _add_export,
-        _add_filters,
-        _add_formats,
-    ):
+    for add in _COMMANDS:
         add(commands)
     return parser
 
@@ -168,6 +158,20 @@ def _add_filters(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 def _add_formats(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     _add_json(_add_command(commands, "formats", "list the log formats that are read, a line each"))
+
+
+_COMMANDS = (
+    _add_inspect,
+    _add_init,
+    _add_run,
+    _add_compare,
+    _add_synth,
+    _add_experiment,
+    _add_export,
+    _add_filters,
+    _add_formats,
+)
+"""What the command line knows, in the order of its help; docs/recipes.md says how to add one."""
 
 
 if __name__ == "__main__":

@@ -31,7 +31,7 @@ _LONGEST_NAMES = 60
 """Names of runs that a title holds [characters]."""
 
 
-def write_outputs(result: RunResult, out_dir: Path) -> dict[str, Path]:
+def write_outputs(result: RunResult, out_dir: str | Path) -> dict[str, Path]:
     """Writes solution.csv, report.json, report.md, report.html, config.toml, config.estimated.toml where the method estimated
     noise from the whole log, launch.csv in the launch-inertial frame, and, unless the configuration says otherwise,
     recording.rrd. Returns the paths by name. Raises LogError when the folder cannot be written."""
@@ -57,7 +57,7 @@ def write_outputs(result: RunResult, out_dir: Path) -> dict[str, Path]:
         from pipelines.recording.view import write_recording  # loading rerun takes a second, and not every run records
 
         writers["recording.rrd"] = lambda path: write_recording(path, result)
-    return _write_files(out_dir, writers)
+    return _write_files(Path(out_dir), writers)
 
 
 def write_each(outcomes: Iterable[Outcome], out_dir: Path) -> Comparison:

@@ -30,10 +30,11 @@ from navreplay.calibration.settled import Calibration
 from navreplay.filters.cubature import Cubature
 from navreplay.filters.moments import Linearised, MomentRule
 from navreplay.filters.weights import Immae, Mmae, MmaeFloor
+from navreplay.plugins import load_plugins
 from navreplay.timeline import LogError
 from navreplay.update.adapter import NoiseAdapter
 
-__all__ = ["PRESETS", "BankPreset", "Method", "Preset", "build_method"]
+__all__ = ["PRESETS", "BankPreset", "Method", "Preset", "build_method", "known_methods"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,14 +158,22 @@ PRESETS: dict[str, Preset | BankPreset] = {
 }
 
 
+def known_methods() -> dict[str, Preset | BankPreset]:
+    """The presets by name, and behind them those that other packages register under `navreplay.filters`; of equal names the one
+    here counts. Raises LogError for a plug-in that cannot be loaded."""
+    plugins = (preset for preset in load_plugins("navreplay.filters", Preset) if isinstance(preset, Preset))
+    return {preset.name: preset for preset in plugins} | PRESETS
+
+
 def build_method(name: str, parameters: Mapping[str, object] | None = None) -> Method:
     """The method of a preset with its parameters replaced.
 
     Raises LogError for an unknown name or parameter, or a value of the wrong type, with what would be valid.
     """
-    if name not in PRESETS:
-        raise LogError(f"filter: there is no '{name}'; {_suggest(name, list(PRESETS))}")
-    preset = PRESETS[name]
+    known = PRESETS if name in PRESETS else known_methods()
+    if name not in known:
+        raise LogError(f"filter: there is no '{name}'; {_suggest(name, list(known))}")
+    preset = known[name]
     defaults = preset.parameters
     checked: dict[str, object] = {}
     for key, value in (parameters or {}).items():

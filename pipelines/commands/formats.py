@@ -3,18 +3,19 @@
 import argparse
 import json
 
-from importers.formats import FORMATS
+from importers.formats import known_formats
 
 __all__ = ["run"]
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Prints name, extensions and description of every format."""
+    known_here = known_formats()
     if arguments.json:
-        formats = {known.name: {"extensions": known.extensions, "description": known.description} for known in FORMATS}
+        formats = {known.name: {"extensions": known.extensions, "description": known.description} for known in known_here}
         print(json.dumps(formats, indent=2))
         return
-    width = max(len(known.name) for known in FORMATS)
-    for known in FORMATS:
+    width = max(len(known.name) for known in known_here)
+    for known in known_here:
         extensions = f" ({', '.join(known.extensions)})" if known.extensions else ""
         print(f"{known.name:<{width}}  {known.description}{extensions}")

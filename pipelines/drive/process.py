@@ -41,7 +41,7 @@ class Drive:
     forward: float = 0.0
 
 
-def process(paths: Sequence[Path], config: Config, progress: Progress | None = None) -> RunResult:
+def process(paths: Sequence[str | Path], config: Config, progress: Progress | None = None) -> RunResult:
     """Reads the logs as one drive and filters it as configured.
 
     Raises LogError for logs that cannot be read, that preflight refuses, or that the filter cannot start on.
@@ -50,7 +50,7 @@ def process(paths: Sequence[Path], config: Config, progress: Progress | None = N
     return filter_drive(read_drive(paths, config, progress), config, progress)
 
 
-def read_drive(paths: Sequence[Path], config: Config, progress: Progress | None = None) -> Drive:
+def read_drive(paths: Sequence[str | Path], config: Config, progress: Progress | None = None) -> Drive:
     """The logs merged into one timeline and checked. Raises LogError with the first error that preflight finds."""
     timing: dict[str, float] = {}
     with _stage("reading", timing, progress) as tell:

@@ -12,7 +12,16 @@ from navreplay.geodesy.time_scales import gps_from_week_tow, utc_from_gps, week_
 from navreplay.solution import RowStatus, Solution
 from navreplay.timeline import Floats, LogError, Times
 
-__all__ = ["COLUMNS", "SolutionTable", "euler_std", "read_solution_csv", "utc_text", "write_solution_csv"]
+__all__ = [
+    "COLUMNS",
+    "SolutionTable",
+    "euler_std",
+    "read_columns",
+    "read_solution_csv",
+    "solution_columns",
+    "utc_text",
+    "write_solution_csv",
+]
 
 _DPH = np.degrees(3600)
 _MG = 1 / 9.80665e-3
@@ -108,6 +117,15 @@ def _number_columns(solution: Solution) -> Floats:
     )
 
 
+def solution_columns(solution: Solution) -> dict[str, np.ndarray]:
+    """The columns of solution.csv but utc, each (k,), as numbers and names."""
+    week, tow = week_tow_from_gps(solution.t_ns)
+    names = {status: status.name.lower() for status in RowStatus}
+    status = np.array([names[RowStatus(value)] for value in solution.status.tolist()], dtype=object)
+    numbers = dict(zip(_NUMBERS, _number_columns(solution).T, strict=True))
+    return {"gps_week": np.asarray(week), "gps_tow_s": np.asarray(tow), **numbers, "status": status}
+
+
 def write_solution_csv(path: Path, solution: Solution) -> None:
     """Writes the solution, the same bytes for the same solution."""
     week, _ = week_tow_from_gps(solution.t_ns)
@@ -123,18 +141,16 @@ def write_solution_csv(path: Path, solution: Solution) -> None:
         file.writelines(line % row for row in zip(*columns, strict=True))
 
 
+def read_columns(path: Path) -> tuple[Times, dict[str, np.ndarray]]:
+    """Times (k,) [GPS ns] and the columns but utc of a solution.csv. Raises LogError as `read_solution_csv`."""
+    table = _read_table(path)
+    columns = {name: table[name].to_numpy(zero_copy_only=False) for name in COLUMNS if name != "utc"}
+    return gps_from_week_tow(columns["gps_week"], columns["gps_tow_s"]), columns
+
+
 def read_solution_csv(path: Path) -> SolutionTable:
     """Reads what `write_solution_csv` wrote. Raises LogError when the file is missing, empty or of another layout."""
-    types = {name: pa.float64() for name in (*_NUMBERS, "gps_tow_s")} | {"gps_week": pa.int64(), "status": pa.string()}
-    options = csv.ConvertOptions(column_types=types, include_columns=[name for name in COLUMNS if name != "utc"])
-    try:
-        table = csv.read_csv(path, convert_options=options)
-    except OSError as error:
-        raise LogError(f"{path}: cannot read the solution; is this folder what `navreplay run -o` wrote? ({error})") from error
-    except (pa.ArrowInvalid, KeyError) as error:
-        raise LogError(f"{path}: not a solution.csv of navreplay: {' '.join(str(error).split())}") from error
-    if len(table) == 0:
-        raise LogError(f"{path}: the solution holds no rows")
+    table = _read_table(path)
     values = np.stack([table[name].to_numpy() for name in _NUMBERS], axis=1)
     degrees = np.radians(values)
     return SolutionTable(
@@ -147,3 +163,17 @@ def read_solution_csv(path: Path) -> SolutionTable:
         accel_bias=values[:, 21:24] / _MG,
         status=tuple(table["status"].to_pylist()),
     )
+
+
+def _read_table(path: Path) -> pa.Table:
+    types = {name: pa.float64() for name in (*_NUMBERS, "gps_tow_s")} | {"gps_week": pa.int64(), "status": pa.string()}
+    options = csv.ConvertOptions(column_types=types, include_columns=[name for name in COLUMNS if name != "utc"])
+    try:
+        table = csv.read_csv(path, convert_options=options)
+    except OSError as error:
+        raise LogError(f"{path}: cannot read the solution; is this folder what `navreplay run -o` wrote? ({error})") from error
+    except (pa.ArrowInvalid, KeyError) as error:
+        raise LogError(f"{path}: not a solution.csv of navreplay: {' '.join(str(error).split())}") from error
+    if len(table) == 0:
+        raise LogError(f"{path}: the solution holds no rows")
+    return table

@@ -1,0 +1,90 @@
+"""docs/recipes.md, plug-ins: examples/plugin, installed as a package would be, is found, used, and blamed where it is
+broken."""
+
+from importlib import invalidate_caches
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from navreplay import plugins
+from navreplay.filters.presets import PRESETS, build_method, known_methods
+from navreplay.timeline import LogError
+from pipelines import cli
+from synthetic_logs import simulate, with_duration, write
+from synthetic_logs.scenarios import SCENARIOS
+from tests.helpers.paths import ROOT
+
+EXAMPLE = ROOT / "examples" / "plugin"
+
+
+def install(folder: Path, monkeypatch: pytest.MonkeyPatch, entry_points: str) -> None:
+    """What pip leaves of a package: its metadata and its modules on the path."""
+    info = folder / "navreplay_example_plugin-1.0.dist-info"
+    info.mkdir(exist_ok=True)
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: navreplay-example-plugin\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(entry_points)
+    monkeypatch.syspath_prepend(str(EXAMPLE))
+    monkeypatch.syspath_prepend(str(folder))
+    invalidate_caches()
+    plugins.load_plugins.cache_clear()
+
+
+@pytest.fixture(autouse=True)
+def _forget() -> None:
+    yield
+    plugins.load_plugins.cache_clear()
+
+
+BOTH = "[navreplay.formats]\nsteps = steps_format:STEPS\n[navreplay.filters]\nhalf-trust = half_trust:HALF_TRUST\n"
+
+
+def test_the_example_declares_what_is_installed_here() -> None:
+    declared = (EXAMPLE / "pyproject.toml").read_text()
+    assert 'steps = "steps_format:STEPS"' in declared
+    assert 'half-trust = "half_trust:HALF_TRUST"' in declared
+    assert all(len(path.read_text().splitlines()) < 40 for path in EXAMPLE.glob("*.py"))
+
+
+def test_a_format_and_a_method_of_ones_own_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    install(tmp_path, monkeypatch, BOTH)
+    log = simulate(with_duration(SCENARIOS["car-short"], 60.0), 1)
+    write(log, tmp_path / "car.csv")
+    columns = np.column_stack([log.imu.t_ns / 1e9, log.imu.gyro, log.imu.accel])
+    np.savetxt(tmp_path / "car.steps", columns, fmt="%.9f", header="steps", comments="#")
+    logs = [str(tmp_path / "car.steps"), str(tmp_path / "car.fix.csv")]
+    assert (
+        cli.main(["run", *logs, "--filter", "half-trust", "-o", str(tmp_path / "out"), "--set", "output.recording=false"]) == 0
+    )
+    assert cli.main(["formats"]) == cli.main(["filters"]) == 0
+    listed = capsys.readouterr().out
+    assert "steps of a made-up IMU" in listed
+    assert "measurements count half" in listed
+
+
+@pytest.mark.parametrize(
+    ("entry", "told"),
+    [
+        ("broken = no_such_module:THING", "cannot be loaded: ModuleNotFoundError"),
+        ("broken = half_trust:HalfTrust", "is no Preset"),
+        ("broken = half_trust:MISSING", "cannot be loaded: AttributeError"),
+    ],
+)
+def test_a_broken_plug_in_is_named_with_its_package(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], entry: str, told: str
+) -> None:
+    install(tmp_path, monkeypatch, f"[navreplay.filters]\n{entry}\n")
+    assert cli.main(["filters"]) == 1
+    line = capsys.readouterr().err
+    assert told in line
+    assert "of package 'navreplay-example-plugin'" in line
+    assert line.count("\n") == 1
+
+
+def test_a_built_in_is_not_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    install(tmp_path, monkeypatch, "[navreplay.filters]\nfixed = half_trust:HALF_TRUST\n")
+    assert known_methods()["fixed"] is PRESETS["fixed"]
+    with pytest.raises(LogError, match="there is no 'halftrust'; did you mean 'half-trust'"):
+        build_method("halftrust")
