@@ -1,5 +1,6 @@
 """Formats that can be read, and opening a log by what it holds."""
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,6 +39,11 @@ __all__ = ["FORMATS", "Format", "known_formats", "open_log"]
 _HEAD_BYTES = 20_000
 _FAR_BYTES = 4_000_000
 """How far a stream is searched for its first message that is read."""
+
+
+# What a stream of these at least holds; their readers, which take a while to import, look closer.
+_NOVATEL = re.compile(rb"\xaaD[\x12\x13]|[#%][A-Z0-9]+A,")
+_RTCM = re.compile(rb"\xd3[\x00-\x03]")
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,7 +235,7 @@ def _open_ubx(path: str, head: bytes, settings: InputSettings) -> Log | None:
 
 
 def _open_novatel(path: str, head: bytes, settings: InputSettings) -> Log | None:
-    if not any(sync in head for sync in (b"\xaaD\x12", b"\xaaD\x13", b"A,")):
+    if _NOVATEL.search(head) is None:
         return None
     from importers.receivers.novatel import is_novatel, open_novatel
 
@@ -245,7 +251,7 @@ def _open_sbf(path: str, head: bytes, settings: InputSettings) -> Log | None:
 
 
 def _open_rtcm(path: str, head: bytes, settings: InputSettings) -> Log | None:
-    if b"\xd3" not in head:
+    if _RTCM.search(head) is None:
         return None
     from importers.receivers.rtcm import is_rtcm, open_rtcm
 

@@ -53,6 +53,7 @@ RECEIVER_TYPES: Mapping[str, ReceiverType] = {
     "ubx/NAV-HPPOSLLH": ReceiverType(_FIX, rank=1),
     "ubx/HNR-PVT": ReceiverType(("reference", "fix"), _OWN_FUSION),
     "ubx/NAV-ATT": ReceiverType(("attitude",), automatic=False),
+    "ubx/HNR-ATT": ReceiverType(("attitude",), automatic=False),
     "ubx/ESF-RAW": ReceiverType(("imu",), _SENSOR_NOTE),
     "ulog/sensor_combined": ReceiverType(("imu",), _BOOT_NOTE, means=True),
     "ulog/vehicle_imu": ReceiverType(("imu",), _BOOT_NOTE, rank=1, means=True),

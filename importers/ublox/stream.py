@@ -25,7 +25,7 @@ from navreplay.timeline import LogError, Times
 __all__ = ["UbxLog", "is_ubx"]
 
 _RAWX, _SFRBX, _PVT, _HPPOSLLH, _COV = 0x0215, 0x0213, 0x0107, 0x0114, 0x0136
-_ATT, _HNR_PVT, _ESF_MEAS, _ESF_RAW = 0x0105, 0x2800, 0x1002, 0x1003
+_ATT, _HNR_PVT, _HNR_ATT, _ESF_MEAS, _ESF_RAW = 0x0105, 0x2800, 0x2801, 0x1002, 0x1003
 _SFRBX_HEAD_BYTES, _WORDS = 8, 10
 _NMEA = "NMEA"
 _LENGTHS = {
@@ -35,6 +35,7 @@ _LENGTHS = {
     _HPPOSLLH: (36, 0),
     _COV: (64, 0),
     _ATT: (32, 0),
+    _HNR_ATT: (32, 0),
     _HNR_PVT: (72, 0),
     _ESF_MEAS: (12, 4),
     _ESF_RAW: (12, 8),
@@ -46,6 +47,7 @@ _NAMES = {
     _HPPOSLLH: "NAV-HPPOSLLH",
     _ATT: "NAV-ATT",
     _HNR_PVT: "HNR-PVT",
+    _HNR_ATT: "HNR-ATT",
     _ESF_RAW: "ESF-RAW",
     _ESF_MEAS: "ESF-MEAS",
 }
@@ -85,7 +87,8 @@ class UbxLog:
             "RXM-SFRBX": self._words,
             "NAV-PVT": self._solutions,
             "NAV-HPPOSLLH": self._precise_positions,
-            "NAV-ATT": self._attitudes,
+            "NAV-ATT": lambda: self._attitudes(_ATT),
+            "HNR-ATT": lambda: self._attitudes(_HNR_ATT),
             "HNR-PVT": self._high_rate,
             "ESF-RAW": lambda: self._sensor(_ESF_RAW),
             "ESF-MEAS": lambda: self._sensor(_ESF_MEAS),
@@ -143,8 +146,8 @@ class UbxLog:
     def _high_rate(self) -> Table:
         return _dated(navigation.high_rate(self._records(_HNR_PVT), self._leap), self._frames[_HNR_PVT])
 
-    def _attitudes(self) -> Table:
-        return _dated(navigation.attitudes(self._records(_ATT), self._epochs()), self._frames[_ATT])
+    def _attitudes(self, kind: int) -> Table:
+        return _dated(navigation.attitudes(self._records(kind), self._epochs()), self._frames[kind])
 
     def _sensor(self, kind: int) -> Table:
         frames = self._frames[kind]
@@ -178,6 +181,7 @@ _LAYOUTS = {
     _HPPOSLLH: navigation.HIGH_PRECISION,
     _COV: navigation.COVARIANCE,
     _ATT: navigation.ATTITUDE,
+    _HNR_ATT: navigation.ATTITUDE,
     _HNR_PVT: navigation.HIGH_RATE,
 }
 

@@ -162,11 +162,12 @@ def test_a_sensor_without_fixes_says_what_it_lacks(tmp_path: Path) -> None:
         load_timeline([tmp_path / "a.ubx"])
 
 
-def test_attitudes_are_dated_by_the_fixes(tmp_path: Path) -> None:
+@pytest.mark.parametrize("group", ["NAV", "HNR"])
+def test_attitudes_are_dated_by_the_fixes(tmp_path: Path, group: str) -> None:
     angles = {"roll": 1.5, "pitch": -2.5, "heading": 123.4, "accRoll": 0.5, "accPitch": 0.6, "accHeading": 2.0}
-    known = UBXMessage("NAV", "NAV-ATT", GET, iTOW=START_TOW_MS + 500, **angles)
-    unknown = UBXMessage("NAV", "NAV-ATT", GET, iTOW=START_TOW_MS + 1500, roll=0.0, pitch=0.0, heading=10.0)
-    table = read(tmp_path / "a.ubx", pvt(0.0) + known.serialize() + pvt(1.0) + unknown.serialize(), "NAV-ATT")
+    known = UBXMessage(group, f"{group}-ATT", GET, iTOW=START_TOW_MS + 500, **angles)
+    unknown = UBXMessage(group, f"{group}-ATT", GET, iTOW=START_TOW_MS + 1500, roll=0.0, pitch=0.0, heading=10.0)
+    table = read(tmp_path / "a.ubx", pvt(0.0) + known.serialize() + pvt(1.0) + unknown.serialize(), f"{group}-ATT")
     assert table.columns["t_gps_ns"].tolist() == [START_NS + 500_000_000, START_NS + 1_500_000_000]
     np.testing.assert_allclose(np.degrees(euler_from_quat(table.columns["q_nb"][:1])[0]), [1.5, -2.5, 123.4], atol=2e-5)
     np.testing.assert_allclose(np.degrees(np.sqrt(np.diagonal(table.columns["cov_att"][0]))), [0.6, 0.6, 2.0], atol=2e-5)
