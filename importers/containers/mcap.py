@@ -21,7 +21,7 @@ from importers.containers.mcap_records import (
 from importers.containers.record_file import RecordFile
 from importers.containers.record_walk import Walk
 from importers.decoding.blocks import Block, Buffer, Decoder, Loss, Offsets
-from importers.decoding.channel_reading import name_numbers, read_tables, require_channels
+from importers.decoding.channel_reading import name_numbers, read_channels
 from importers.rows.log import Channel, Table
 from navreplay.timeline import LogError
 
@@ -65,10 +65,7 @@ class McapLog:
 
     def read(self, names: tuple[str, ...]) -> dict[str, Table]:
         """See `Log`."""
-        require_channels(self.path, names, self.channels())
-        numbers = self._numbers()
-        wanted = {name: numbers[name] for name in names}
-        return read_tables(wanted, self._decoder, self._messages, self._directory.counts)
+        return read_channels(self, names, self._numbers(), self._decoder, self._messages, self._directory.counts)
 
     def _numbers(self) -> dict[str, list[int]]:
         channels = self._directory.channels

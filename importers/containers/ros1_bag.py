@@ -10,7 +10,7 @@ from importers.containers.compression import DamagedDataError
 from importers.containers.record_file import RecordFile
 from importers.containers.record_walk import Walk
 from importers.decoding.blocks import Block, Buffer, Decoder, Loss
-from importers.decoding.channel_reading import name_numbers, read_tables, require_channels
+from importers.decoding.channel_reading import name_numbers, read_channels
 from importers.rows.log import Channel, Table
 from navreplay.timeline import LogError
 
@@ -53,10 +53,7 @@ class Ros1Bag:
 
     def read(self, names: tuple[str, ...]) -> dict[str, Table]:
         """See `Log`."""
-        require_channels(self.path, names, self.channels())
-        numbers = self._numbers()
-        wanted = {name: numbers[name] for name in names}
-        return read_tables(wanted, self._decoder, self._messages, self._directory.counts)
+        return read_channels(self, names, self._numbers(), self._decoder, self._messages, self._directory.counts)
 
     def _numbers(self) -> dict[str, list[int]]:
         connections = self._directory.connections

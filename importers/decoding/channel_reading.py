@@ -6,10 +6,10 @@ from difflib import get_close_matches
 import numpy as np
 
 from importers.decoding.blocks import Block, Buffer, Decoded, Decoder, Loss, Offsets, TableBuilder, collect
-from importers.rows.log import Channel, Table
+from importers.rows.log import Channel, Log, Table
 from navreplay.timeline import LogError
 
-__all__ = ["name_numbers", "read_tables", "require_channels"]
+__all__ = ["name_numbers", "read_channels", "read_tables", "require_channels"]
 
 _LISTED = 12
 
@@ -33,6 +33,19 @@ def name_numbers(channels: Iterable[tuple[int, str, str]]) -> dict[str, list[int
         same = first.setdefault(topic, type) == type
         numbers.setdefault(topic if same else f"{topic}#{type or 'unknown'}", []).append(number)
     return numbers
+
+
+def read_channels(
+    log: Log,
+    names: Sequence[str],
+    numbers: Mapping[str, Sequence[int]],
+    decoder: Callable[[int], Decoder],
+    messages: Callable[[set[int]], Iterable[Block | Loss]],
+    counts: Mapping[int, int] | None,
+) -> dict[str, Table]:
+    """Tables of the channels named, of all that `read_tables` takes. Raises LogError for a name that is no channel."""
+    require_channels(log.path, names, log.channels())
+    return read_tables({name: numbers[name] for name in names}, decoder, messages, counts)
 
 
 def read_tables(
