@@ -11,6 +11,7 @@ from importers.findings import Finding
 from importers.formats import open_log
 from importers.load import build_timeline, describe_file, open_logs
 from importers.preflight.checks import preflight
+from importers.roles.draft import draft_local, draft_mapping
 from importers.roles.messages import kind_of, stamp_column
 from importers.roles.selection import SETTING, Choice, always_used, candidates, choose_role
 from importers.roles.sources import Clock, Source, join_sources
@@ -21,9 +22,15 @@ from importers.vetting.vet import vet
 from navreplay.geodesy.time_scales import LeapSeconds, gps_from_utc
 from navreplay.timeline import LogError, SourceFile, Times
 
-__all__ = ["ChannelInfo", "Inspection", "inspect_logs"]
+__all__ = ["ChannelInfo", "Inspection", "draft_mappings", "inspect_logs"]
 
 _GAP_FACTOR = 3.0
+_ENCODINGS = ("cdr", "ros1", "json", "protobuf")
+_MANY = 1_000_000
+_WITHOUT_NAVIGATION = (
+    "actionlib_msgs", "can_msgs", "diagnostic_msgs", "map_msgs", "rcl_interfaces", "rosgraph_msgs", "sensor_msgs", "shape_msgs",
+    "std_msgs", "stereo_msgs", "tf", "tf2_msgs", "trajectory_msgs", "visualization_msgs",
+)  # fmt: skip
 _EPOCH_1990_UNIX_NS = 631_152_000 * 10**9
 
 
@@ -95,6 +102,32 @@ def inspect_logs(
         findings += [finding for finding in (*vetted, *preflight(timeline)) if finding.code not in _implied(open_choices)]
     files = tuple(describe_file(log) for log in everything)
     return Inspection(files, channels, tuple(findings), open_choices, assumptions, recognised)
+
+
+def draft_mappings(paths: Sequence[str | Path], settings: InputSettings, inspection: Inspection) -> list[str]:
+    """Lines of TOML with a mapping for each channel of an unknown type whose fields suggest one: as comments, unless nothing
+    else serves its role. Raises LogError where a file cannot be opened."""
+    served = {channel.role for channel in inspection.channels}
+    lines: list[str] = []
+    for log in open_logs(paths, settings):
+        unknown = tuple(channel for channel in log.channels() if _is_unknown(channel))
+        tables = log.read(tuple(channel.name for channel in unknown)) if unknown else {}
+        drafts = [draft_mapping(channel, tables[channel.name]) for channel in unknown if len(tables[channel.name].log_time_ns)]
+        if "fix" not in served:
+            drafts += [draft_local(channel) for channel in log.channels()]
+        for draft in drafts:
+            if draft is not None:
+                active = draft.usable and draft.role not in served
+                served |= {draft.role} if draft.usable else set()
+                lines += ["", *(line if active else f"# {line}" for line in draft.lines)]
+    return lines
+
+
+def _is_unknown(channel: Channel) -> bool:
+    """Whether a channel of messages may hold measurements under a type without a meaning known here."""
+    package = channel.type.partition("/")[0]
+    standard = package in _WITHOUT_NAVIGATION or channel.type.startswith("foxglove.")
+    return channel.encoding in _ENCODINGS and kind_of(channel) is None and not standard and (channel.count or 0) <= _MANY
 
 
 def _implied(open_choices: Mapping[str, tuple[str, ...]]) -> tuple[str, ...]:

@@ -23,6 +23,9 @@ _GEOID_BIAS_M = 8.0
 _HORIZONTAL = (("forward", "back"), ("right", "left"))
 
 
+_MAPPING = "messages of another type are described by [[input.message]], which navreplay init drafts"
+
+
 def preflight(timeline: Timeline) -> tuple[Finding, ...]:
     """All findings about a timeline, errors first, one of a kind."""
     findings: list[Finding] = []
@@ -31,7 +34,7 @@ def preflight(timeline: Timeline) -> tuple[Finding, ...]:
     if imu is None:
         # ranges alone suffice for a GNSS-only filter
         level: Literal["warning", "error"] = "error" if timeline.ranges is None else "warning"
-        hint = "Add the file that holds the IMU, or name its channel with input.imu.channel."
+        hint = f"Add the file that holds the IMU, or name its channel with input.imu.channel; {_MAPPING}."
         findings.append(Finding(level, "no-imu", f"There is no IMU in the log; it holds {seen}.", hint))
     else:
         in_space = timeline.attitude is not None and timeline.attitude.frame == "earth"
@@ -46,7 +49,7 @@ def preflight(timeline: Timeline) -> tuple[Finding, ...]:
         hint = "Set alignment.position_deg_m and alignment.velocity_mps; expect the position to drift."
         findings.append(Finding("info", "no-gnss", text, hint))
     elif fixes is None and timeline.ranges is None:
-        hint = "Add the file that holds the fixes, or name their channel with input.fix.channel."
+        hint = f"Add the file that holds the fixes, or name their channel with input.fix.channel; {_MAPPING}."
         findings.append(Finding("error", "no-gnss", f"There are no GNSS fixes in the log; it holds {seen}.", hint))
     elif fixes is not None:
         findings += _check_covariance(fixes)

@@ -142,6 +142,8 @@ def _velocities(values: dict[str, Floats]) -> dict[str, np.ndarray]:
         }
     if "vel_u" in values:
         values = values | {"vel_d": -values["vel_u"]}
+    if values.keys() >= {"vel_n", "vel_e"} and "vel_d" not in values:
+        values = values | {"vel_d": np.zeros(len(values["vel_n"]))}  # vetting tells a vertical part that is never filled
     vel = _vector(values, ["vel_n", "vel_e", "vel_d"])
     return {} if vel is None else {"vel_n": vel}
 

@@ -2,7 +2,7 @@
 
 import argparse
 
-from importers.inspection import Inspection, inspect_logs
+from importers.inspection import Inspection, draft_mappings, inspect_logs
 from importers.roles.selection import SETTING
 from navreplay.timeline import LogError
 from pipelines.commands.options import read_config
@@ -16,9 +16,13 @@ __all__ = ["run"]
 def run(arguments: argparse.Namespace) -> None:
     """Writes the configuration. Raises LogError for logs that cannot be opened or a file that cannot be written."""
     check_file(arguments.out, arguments.force)
-    inspection = inspect_logs(arguments.logs, read_config(arguments).input)
+    settings = read_config(arguments).input
+    inspection = inspect_logs(arguments.logs, settings)
     config = load_config(arguments.config, [*_found(inspection), *arguments.sets])
-    text = commented_template(config, _notes(inspection))
+    drafts = draft_mappings(arguments.logs, settings, inspection)
+    if config.input.message:  # written out above, and no table of TOML is told twice
+        drafts = [f"# {line}".rstrip() for line in drafts]
+    text = commented_template(config, _notes(inspection)) + "".join(f"{line}\n" for line in drafts)
     try:
         arguments.out.parent.mkdir(parents=True, exist_ok=True)
         arguments.out.write_text(text, encoding="utf-8")
