@@ -13,6 +13,7 @@ from importers.conversion.imu_pair import join_accelerations
 from importers.conversion.ranges import convert_ranges
 from importers.conversion.reference import convert_reference, reference_from_fixes
 from importers.formats import open_log
+from importers.roles.mapped_log import unused_mappings
 from importers.roles.selection import Choice, choose_channels, named_channel
 from importers.roles.sources import Clock, Source, join_sources
 from importers.rows.clock import leap_seconds
@@ -97,6 +98,7 @@ def build_timeline(
         notes.append("the fixes themselves, before any is withheld, serve as the reference: not an independent one")
     files = tuple(describe_file(log) for log in {log.path: log for log in logs}.values())
     damage = (*(f"{log.path}: {note}" for log in logs for note in log.notes), *unreadable)
+    damage += tuple(unused_mappings(logs, settings.message))
     provenance = Provenance(files, _complete(logs, uses), tuple(dict.fromkeys(notes)), damage, tuple(recognised.items()))
     return Timeline(
         imu=imu,

@@ -106,15 +106,15 @@ def draft_mapping(channel: Channel, table: Table) -> Draft | None:
 
 
 def draft_local(channel: Channel) -> Draft | None:
-    """A mapping for positions in a map (nav_msgs/Odometry of a GNSS), whose origin only the user knows; None for other types."""
+    """A mapping for positions in a map (nav_msgs/Odometry), whose origin only the user knows; None for other types."""
     if not channel.type.endswith("/Odometry"):
         return None
     columns = {name: f"pose.pose.position.{axis}" for name, axis in zip(("east", "north", "up"), "xyz", strict=True)}
     lines = [
-        "[[input.message]] # where these positions come from the GNSS (navsat_transform): they serve as fixes with their origin",
+        "[[input.message]] # where these positions come from the GNSS (navsat_transform), they serve as fixes",
         f'topic = "{channel.name}"',
         'role = "fix"',
-        "origin_deg_m = [48.0, 11.0, 500.0] # of the map: latitude [deg], longitude [deg], height [m]; these are not known here",
+        "origin_deg_m = [48.0, 11.0, 500.0] # of the map, which is not known here: latitude, longitude [deg], height [m]",
         "[input.message.columns]",
         *(f'{name} = "{path}"' for name, path in columns.items()),
     ]

@@ -15,7 +15,7 @@ from importers.settings import MessageMapping
 from navreplay.geodesy.time_scales import LeapSeconds
 from navreplay.timeline import LogError
 
-__all__ = ["CONVERTED", "MappedLog"]
+__all__ = ["CONVERTED", "MappedLog", "unused_mappings"]
 
 _FIRST_RANK = 1
 _LAST_RANK = 9
@@ -118,9 +118,22 @@ class MappedLog:
         return map_table(joined, mapping, self._leap, source)
 
 
+def unused_mappings(logs: Sequence[Log], told: Sequence[MessageMapping]) -> list[str]:
+    """Sentences on mappings of the configuration that fit no channel of any log."""
+    channels = [channel for log in logs for channel in log.channels()]
+    unused = [mapping for mapping in told if not any(_fits(channel, mapping) for channel in channels)]
+    there = ", ".join(f"{channel.name} ({channel.type})" for channel in channels) or "no channel at all"
+    return [
+        f"the mapping [[input.message]] for {' and '.join(filter(None, (mapping.topic, mapping.type)))} fits no channel and is not "
+        f"used; there is {there}"
+        for mapping in unused
+    ]
+
+
 def _fits(channel: Channel, mapping: MessageMapping) -> bool:
     type = channel.type.replace("/msg/", "/")
-    return (mapping.topic is None or fnmatchcase(channel.name, mapping.topic)) and (
+    topic = channel.name.partition("#")[0]
+    return (mapping.topic is None or fnmatchcase(topic, mapping.topic)) and (
         mapping.type is None or fnmatchcase(type, mapping.type.replace("/msg/", "/"))
     )
 

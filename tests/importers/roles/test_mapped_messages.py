@@ -275,6 +275,37 @@ def test_a_mapping_of_the_configuration_goes_first(tmp_path: Path) -> None:
     assert np.allclose(fixes.lla[:, 2], 7.0)
 
 
+def test_a_mapping_that_fits_no_channel_is_told(tmp_path: Path) -> None:
+    kind = "px4_msgs/msg/SensorGps"
+    values = {"latitude_deg": LAT, "longitude_deg": LON, "altitude_ellipsoid_m": HEIGHT, "fix_type": 3}
+    bag = write_humble(tmp_path / "bag", [("/gnss", kind, START_NS + i * 10**8, values) for i in range(N)])
+    told = mapping(topic="/gps", columns={"lat": "a", "lon": "b"})
+    (note,) = load_timeline([bag], InputSettings(message=(told,))).provenance.damage
+    assert note.startswith("the mapping [[input.message]] for /gps fits no channel and is not used; there is /gnss (px4_msgs")
+
+
+@pytest.mark.parametrize("role", ["fix", "velocity"])
+def test_a_mapping_that_does_not_fit_the_messages_costs_only_its_channel(tmp_path: Path, role: str) -> None:
+    kind = "px4_msgs/msg/SensorGps"
+    values = {"latitude_deg": LAT, "longitude_deg": LON, "altitude_ellipsoid_m": HEIGHT, "fix_type": 3}
+    topics = ("/gnss", "/other")
+    messages = [(topic, kind, START_NS + i * 10**8, values) for i in range(N) for topic in topics]
+    told = (
+        mapping(topic="/gnss", columns={"lat": "latitude_deg", "lon": "longitude_deg"}),
+        mapping(topic="/other", role=role, columns={"lat": "lat_deg", "lon": "b"} if role == "fix" else {"vel_n": "north"}),
+    )
+    settings = InputSettings.model_validate({"message": told, "fix": {"channel": "/gnss"}})
+    timeline = load_timeline([write_humble(tmp_path / "bag", messages)], settings)
+    assert timeline.fixes is not None
+    assert len(timeline.fixes) == N
+    assert any("names the field 'north'" in note for note in timeline.provenance.damage) == (role == "velocity")
+    if role == "fix":
+        with pytest.raises(
+            LogError, match=r"channel /other holds no readable message .*names the field 'lat_deg' \(lat\), but"
+        ):
+            load_timeline([tmp_path / "bag"], InputSettings.model_validate({"message": told, "fix": {"channel": "/other"}}))
+
+
 def test_sentences_as_messages(tmp_path: Path) -> None:
     def sentence(i: int) -> str:
         body = f"GPGGA,2213{20 + i:02d}.00,4807.4074,N,01136.0000,E,4,12,0.8,467.5,M,45.0,M,,"
