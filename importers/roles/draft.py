@@ -79,6 +79,7 @@ _FAMILY = {
     "vel": "speed",
 }
 _DEFAULT = {"angle": "deg", "rate": "rad/s", "force": "m/s2", "speed": "m/s"}
+_EARLIEST_NS = 6.3e17
 _STAMPS = ("header.stamp", "timestamp", "stamp")
 _TIME = re.compile(r".*(time|stamp|tow|utc).*|t(ns|us|ms|s)?")
 
@@ -98,7 +99,7 @@ def draft_mapping(channel: Channel, table: Table) -> Draft | None:
     lines += [f'topic = "{channel.name}"', f'role = "{role}"', "[input.message.columns]"]
     lines += [f'{quantity} = "{guess.path}" # {guess.reason}' for quantity, guess in guesses.items()]
     lines += ["[input.message.units]", *(f'{quantity} = "{guess.unit}"' for quantity, guess in guesses.items())]
-    time = None if any(name in table.columns for name in _STAMPS) else _guess_time(fields)
+    time = None if any(_is_stamp(table.columns.get(name)) for name in _STAMPS) else _guess_time(fields)
     if time is not None:
         column, unit, base, reason = time
         lines += ["[input.message.time]", f'column = "{column}" # {reason}', f'unit = "{unit}"', f'base = "{base}"']
@@ -191,6 +192,11 @@ def _with_family_units(found: dict[str, _Guess], fields: Mapping[str, Floats]) -
 def _reason(path: str, values: Floats, unit: str) -> str:
     size = np.nanmedian(np.abs(values)) if values.ndim == 1 else np.nanmedian(np.linalg.norm(values, axis=1))
     return f"{'median' if values.ndim == 1 else 'median length'} {size:.6g}, so taken as {unit}"
+
+
+def _is_stamp(column: np.ndarray | None) -> bool:
+    """Whether a column holds nanoseconds since 1970, as a header's stamp does."""
+    return column is not None and column.dtype.kind in "iu" and float(np.median(column)) > _EARLIEST_NS
 
 
 def _guess_time(fields: Mapping[str, Floats]) -> tuple[str, str, str, str] | None:

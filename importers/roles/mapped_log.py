@@ -11,7 +11,7 @@ from importers.roles.esf_messages import ESF_NOTE, esf_samples
 from importers.roles.mapped_messages import fits_fields, map_table
 from importers.roles.nmea_messages import sentence_fixes
 from importers.rows.log import Channel, Log, Table
-from importers.settings import MessageMapping
+from importers.settings import MessageMapping, MessageTime
 from navreplay.geodesy.time_scales import LeapSeconds
 from navreplay.timeline import LogError
 
@@ -48,8 +48,10 @@ class MappedLog:
 
     def _add(self, channel: Channel, told: Sequence[MessageMapping]) -> None:
         """Takes up a channel, once for each role that its mappings give it."""
-        own = tuple(mapping for mapping in told if _fits(channel, mapping))
-        known = own or tuple(mapping for mapping in meanings_of(channel.type.partition("/")[0]) if _fits(channel, mapping))
+        bundled = tuple(mapping for mapping in meanings_of(channel.type.partition("/")[0]) if _fits(channel, mapping))
+        time = next((mapping.time for mapping in bundled if mapping.time is not None), None)
+        own = tuple(_timed(mapping, time) for mapping in told if _fits(channel, mapping))
+        known = own or bundled
         conversion = CONVERTED.get(channel.type.replace("/msg/", "/")) if not own else None
         if conversion is not None:
             layout, note = conversion[1:]
@@ -118,16 +120,18 @@ class MappedLog:
         return map_table(joined, mapping, self._leap, source)
 
 
+def _timed(mapping: MessageMapping, time: MessageTime | None) -> MessageMapping:
+    """The mapping, with the time that is known of its type where it names none."""
+    return mapping if mapping.time is not None or time is None else mapping.model_copy(update={"time": time})
+
+
 def unused_mappings(logs: Sequence[Log], told: Sequence[MessageMapping]) -> list[str]:
     """Sentences on mappings of the configuration that fit no channel of any log."""
     channels = [channel for log in logs for channel in log.channels()]
     unused = [mapping for mapping in told if not any(_fits(channel, mapping) for channel in channels)]
     there = ", ".join(f"{channel.name} ({channel.type})" for channel in channels) or "no channel at all"
-    return [
-        f"the mapping [[input.message]] for {' and '.join(filter(None, (mapping.topic, mapping.type)))} fits no channel and is not "
-        f"used; there is {there}"
-        for mapping in unused
-    ]
+    names = [" and ".join(name for name in (mapping.topic, mapping.type) if name is not None) for mapping in unused]
+    return [f"the mapping [[input.message]] for {name} fits no channel and is not used; there is {there}" for name in names]
 
 
 def _fits(channel: Channel, mapping: MessageMapping) -> bool:

@@ -268,11 +268,13 @@ def test_one_topic_with_two_types(tmp_path: Path, second: str) -> None:
 def test_a_mapping_of_the_configuration_goes_first(tmp_path: Path) -> None:
     kind = "px4_msgs/msg/SensorGps"
     values = {"latitude_deg": LAT, "longitude_deg": LON, "altitude_msl_m": 7.0, "altitude_ellipsoid_m": HEIGHT}
-    bag = write_humble(tmp_path / "bag", [("/gnss", kind, START_NS + i * 10**8, values) for i in range(N)])
+    messages = [("/gnss", kind, START_NS + i * 10**8, values | {"timestamp": i * 100_000}) for i in range(N)]
+    bag = write_humble(tmp_path / "bag", messages)
     told = mapping(topic="/gn*", fields={"lat": "latitude_deg", "lon": "longitude_deg", "height": "altitude_msl_m"})
     fixes = load_timeline([bag], InputSettings(message=(told,))).fixes
     assert fixes is not None
     assert np.allclose(fixes.lla[:, 2], 7.0)
+    assert len(fixes) == N, "the time is known of the type where the mapping names none"
 
 
 def test_a_mapping_that_fits_no_channel_is_told(tmp_path: Path) -> None:
@@ -289,7 +291,7 @@ def test_a_mapping_that_does_not_fit_the_messages_costs_only_its_channel(tmp_pat
     kind = "px4_msgs/msg/SensorGps"
     values = {"latitude_deg": LAT, "longitude_deg": LON, "altitude_ellipsoid_m": HEIGHT, "fix_type": 3}
     topics = ("/gnss", "/other")
-    messages = [(topic, kind, START_NS + i * 10**8, values) for i in range(N) for topic in topics]
+    messages = [(topic, kind, START_NS + i * 10**8, values | {"timestamp": i * 100_000}) for i in range(N) for topic in topics]
     told = (
         mapping(topic="/gnss", columns={"lat": "latitude_deg", "lon": "longitude_deg"}),
         mapping(topic="/other", role=role, columns={"lat": "lat_deg", "lon": "b"} if role == "fix" else {"vel_n": "north"}),
