@@ -80,6 +80,7 @@ _FAMILY = {
 }
 _DEFAULT = {"angle": "deg", "rate": "rad/s", "force": "m/s2", "speed": "m/s"}
 _EARLIEST_NS = 6.3e17
+_ABSURD = 1e19
 _STAMPS = ("header.stamp", "timestamp", "stamp")
 _TIME = re.compile(r".*(time|stamp|tow|utc).*|t(ns|us|ms|s)?")
 
@@ -123,12 +124,15 @@ def draft_local(channel: Channel) -> Draft | None:
 
 
 def _numeric_fields(columns: Mapping[str, np.ndarray]) -> dict[str, Floats]:
-    """Scalar fields (n,) and vectors (n, 3) of numbers that are not all equal to zero or unknown."""
-    return {
-        name: column.astype(np.float64)
-        for name, column in columns.items()
-        if column.dtype.kind in "fiu" and (column.ndim == 1 or column.shape[1:] == (3,)) and np.isfinite(column).any()
-    }
+    """Scalar fields (n,) and vectors (n, 3) of numbers, some of which are known."""
+    fields = {}
+    for name, column in columns.items():
+        if column.dtype.kind in "fiu" and (column.ndim == 1 or column.shape[1:] == (3,)):
+            values = column.astype(np.float64)
+            values = np.where(np.abs(values) < _ABSURD, values, np.nan)
+            if np.isfinite(values.reshape(len(values), -1)).all(axis=1).any():
+                fields[name] = values
+    return fields
 
 
 def _guess(fields: Mapping[str, Floats]) -> dict[str, _Guess]:

@@ -5,11 +5,14 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from navreplay.timeline import Floats
 
-__all__ = ["covariances", "either_spelling", "find_field", "numbers", "numbers_of", "vectors"]
+__all__ = ["codes", "covariances", "either_spelling", "find_field", "numbers", "numbers_of", "vectors"]
 
+Codes = NDArray[np.int64]
+_LARGEST_CODE = 2**31
 _CAPITAL = re.compile(r"(?<=[a-z0-9])[A-Z]")
 _ELEMENT = re.compile(r"(.*)(?:\.([xyzw])|\[(\d+)\])$")
 
@@ -57,6 +60,20 @@ def numbers(columns: Mapping[str, np.ndarray], name: str, n: int) -> Floats:
     """A field of scalars (n,), NaN where a message has none."""
     column = columns.get(name)
     return np.full(n, np.nan) if column is None else numbers_of(column)
+
+
+def codes(
+    columns: Mapping[str, np.ndarray], name: str, n: int, missing: int, meaning: Mapping[str, int] | None = None
+) -> Codes:
+    """A field of whole numbers (n,), or of texts with a meaning (enumerations by name); missing where a message has none."""
+    column = columns.get(name)
+    if column is None:
+        return np.full(n, missing, dtype=np.int64)
+    if column.dtype.kind == "O" and meaning is not None:
+        texts = [meaning.get(value, value) if isinstance(value, str) else value for value in column.tolist()]
+        column = np.fromiter(texts, dtype=object, count=len(texts))
+    values = numbers_of(column)
+    return np.where(np.abs(values) < _LARGEST_CODE, values, missing).astype(np.int64)
 
 
 def vectors(columns: Mapping[str, np.ndarray], name: str, width: int, n: int) -> Floats:

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from importers.roles.ephemeris_messages import EPHEMERIS_TYPES
-from importers.roles.message_fields import covariances, numbers, numbers_of, vectors
+from importers.roles.message_fields import codes, covariances, numbers, numbers_of, vectors
 from importers.roles.range_messages import RANGE_TYPES
 from importers.roles.receiver_types import RECEIVER_TYPES
 from importers.rows.log import Channel, Table
@@ -28,6 +28,8 @@ _RTK_FIXED_STD = 0.1
 _RTK_FLOAT_STD = 1.0
 _APPROXIMATE = (1, 2)
 """Covariance types of which only the diagonal is meant."""
+_STATUS_UNKNOWN = -2
+_COVARIANCE_KNOWN = 3
 _COVARIANCE_TYPES = {"UNKNOWN": 0, "APPROXIMATED": 1, "DIAGONAL_KNOWN": 2, "KNOWN": 3}
 _GPS_STATUS = {
     -1: NO_FIX, 0: FixStatus.SINGLE, 1: FixStatus.DIFFERENTIAL, 18: FixStatus.DIFFERENTIAL, 19: FixStatus.FIXED,
@@ -114,7 +116,7 @@ def _nav_sat_fix(columns: Mapping[str, np.ndarray]) -> Rows:
     cov = _position_covariance(columns)
     status = np.zeros(len(cov), dtype=np.int8)
     if "status.status" in columns:
-        status = _satellite_status(columns["status.status"].astype(np.int64), cov)
+        status = _satellite_status(codes(columns, "status.status", len(cov), _STATUS_UNKNOWN), cov)
     return Rows(lla=_geodetic(columns), cov_pos=cov, status=status)
 
 
@@ -122,7 +124,7 @@ def _gps_fix(columns: Mapping[str, np.ndarray]) -> Rows:
     rows = _nav_sat_fix(columns)
     n = _count(columns)
     if "status.status" in columns:
-        code = columns["status.status"].astype(np.int64)
+        code = codes(columns, "status.status", n, _STATUS_UNKNOWN)
         meant = np.array([_GPS_STATUS.get(value, FixStatus.UNKNOWN) for value in code.tolist()], dtype=np.int8)
         rows = replace(rows, status=np.where(code == 2, rows.status, meant))
     vel, cov_vel = _track_velocity(columns, n)
@@ -162,10 +164,7 @@ def _position_covariance(columns: Mapping[str, np.ndarray]) -> Floats:
     """NED covariances (n, 3, 3) of ENU ones, all NaN where their type says unknown or there is none."""
     n = len(columns["latitude"])
     cov = covariances(columns, "position_covariance", 3, n)
-    kind = columns.get("position_covariance_type", np.full(n, 3))
-    if kind.dtype == object:
-        kind = np.array([_COVARIANCE_TYPES.get(value, value) for value in kind.tolist()], dtype=object)
-    kind = np.nan_to_num(numbers_of(kind)).astype(np.int64)
+    kind = codes(columns, "position_covariance_type", n, _COVARIANCE_KNOWN, _COVARIANCE_TYPES)
     diagonal = np.isin(kind, _APPROXIMATE)
     cov = np.where(diagonal[:, None, None] & ~np.eye(3, dtype=bool), 0.0, cov)
     cov = cov[:, _EAST_NORTH][:, :, _EAST_NORTH] * _UP_SIGNS + 0.0  # by place: an unknown element stays alone; no -0
