@@ -5,11 +5,25 @@ provenance.
 """
 
 from datetime import date
-from math import pi
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import AliasChoices, BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
+
+from importers.message_settings import MessageMapping
+from importers.quantities import (
+    Column,
+    Positive,
+    Quantity,
+    Settings,
+    Signal,
+    Stamp,
+    StatusName,
+    System,
+    TimeBase,
+    Vector,
+    check_axes,
+)
 
 __all__ = [
     "AttitudeInput",
@@ -18,111 +32,16 @@ __all__ = [
     "FixInput",
     "ImuInput",
     "InputSettings",
-    "MessageMapping",
-    "MessageQuantity",
-    "MessageTime",
     "Quantity",
     "RangeCorrections",
     "RangeInput",
     "ReferenceInput",
     "StatusName",
     "TimeBase",
-    "unit_factor",
 ]
 
-TimeBase = Literal["auto", "utc", "gps", "tai", "boot"]
-Stamp = Literal["header", "log"]
-StatusName = Literal["unknown", "single", "differential", "float", "fixed", "dead_reckoning", "none"]
-Column = str | Annotated[int, Field(ge=1)]
-Vector = tuple[float, float, float]
-Positive = Annotated[float, Field(gt=0)]
-System = Literal["G", "R", "E", "C", "J"]
-Signal = Annotated[str, Field(pattern="^[1-9][A-Z]$")]
 
-Quantity = Literal[
-    "gyro_x",
-    "gyro_y",
-    "gyro_z",
-    "accel_x",
-    "accel_y",
-    "accel_z",
-    "lat",
-    "lon",
-    "height",
-    "ecef_x",
-    "ecef_y",
-    "ecef_z",
-    "vel_n",
-    "vel_e",
-    "vel_d",
-    "vel_u",
-    "vel_ecef_x",
-    "vel_ecef_y",
-    "vel_ecef_z",
-    "std_n",
-    "std_e",
-    "std_d",
-    "std_vn",
-    "std_ve",
-    "std_vd",
-    "roll",
-    "pitch",
-    "yaw",
-    "q_w",
-    "q_x",
-    "q_y",
-    "q_z",
-    "std_att_x",
-    "std_att_y",
-    "std_att_z",
-    "status",
-    "sat",
-    "signal",
-    "pseudorange",
-    "range_rate",
-    "doppler_hz",
-    "pseudorange_std",
-    "range_rate_std",
-    "cn0",
-    "sat_x",
-    "sat_y",
-    "sat_z",
-    "sat_vx",
-    "sat_vy",
-    "sat_vz",
-    "sat_clock_s",
-    "sat_clock_m",
-    "relativity_m",
-    "group_delay_m",
-    "ionosphere_m",
-    "troposphere_m",
-]
-"""What a column of a text file can hold. ``yaw`` is clockwise from north; ``q_*`` is the quaternion body (FRD) to NED, or
-to the frame that ``input.attitude`` names, ``std_att_*`` the standard deviations about the axes of that frame. Of
-ranges, ``sat_clock_*`` and ``relativity_m`` are added to the pseudorange, ``group_delay_m``, ``ionosphere_m`` and
-``troposphere_m`` (delays) are subtracted from it."""
-
-_ALONG = {"f": (1, 0, 0), "b": (-1, 0, 0), "r": (0, 1, 0), "l": (0, -1, 0), "d": (0, 0, 1), "u": (0, 0, -1)}
-
-
-class _Settings(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-def check_axes(axes: str) -> str:
-    """The axes as they are. Raises ValueError unless they are ``auto``, or three letters that make a right-handed triad."""
-    if axes == "auto":
-        return axes
-    if len(axes) != 3 or any(letter not in _ALONG for letter in axes):
-        raise ValueError("axes must be 'auto' or three letters of f, b, r, l, u, d, such as 'flu' or 'frd'")
-    x, y, z = (_ALONG[letter] for letter in axes)
-    cross = (x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0])
-    if cross != z:
-        raise ValueError(f"axes '{axes}' are not a right-handed triad; one of the letters points the wrong way")
-    return axes
-
-
-class ImuInput(_Settings):
+class ImuInput(Settings):
     """The inertial sensor. accel_channel: where another channel holds the accelerations. axes: where its x, y, z point in
     the vehicle (forward, back, right, left, up, down), right-handed. mounting_deg: roll, pitch, yaw of the so relabelled
     axes against the vehicle. increments: each sample is the mean over the interval that ends at its stamp. time_offset_s is
@@ -146,7 +65,7 @@ class ImuInput(_Settings):
         return check_axes(axes)
 
 
-class FixInput(_Settings):
+class FixInput(Settings):
     """The GNSS receiver. lever_arm_m: forward, right, down from the IMU to the antenna. height: what the log's heights are
     above; with ``msl`` geoid_separation_m is added to them. min_status: fixes of a lower kind are rejected."""
 
@@ -168,7 +87,7 @@ class FixInput(_Settings):
         return self
 
 
-class AttitudeInput(_Settings):
+class AttitudeInput(Settings):
     """Another attitude sensor: dual antenna, AHRS, star tracker. Of messages only used where channel names it.
 
     frame: what the attitude is against; ``auto`` is NED unless the layout says Earth-fixed; ``inertial`` are axes through the
@@ -189,7 +108,7 @@ class AttitudeInput(_Settings):
     heading_only: bool = False
 
 
-class ReferenceInput(_Settings):
+class ReferenceInput(Settings):
     """The reference solution: a file of its own, or a channel of the logs, or (from_fixes) the fixes before any are
     withheld.
 
@@ -210,7 +129,7 @@ class ReferenceInput(_Settings):
     origin_deg_m: Vector | None = None
 
 
-class RangeInput(_Settings):
+class RangeInput(Settings):
     """Raw pseudoranges. navigation: files with ephemerides beside the logs (RINEX navigation, SP3, or a log that holds them).
     systems: RINEX letters of the systems to use. signals: by system, the signals to use where a satellite has several, best
     first, in place of those of L1, E1 and B1. Observations of a lower C/N0 are rejected."""
@@ -225,7 +144,7 @@ class RangeInput(_Settings):
     navigation: tuple[Path, ...] = Field((), description="files with ephemerides: RINEX navigation, SP3")
 
 
-class RangeCorrections(_Settings):
+class RangeCorrections(Settings):
     """What the pseudoranges of a table hold already, besides what its columns add. sagnac: ``none`` where satellites stand in
     Earth-fixed axes of transmission, ``applied`` where they were turned to those of reception, ``pseudorange`` where that was
     done by pseudorange / c, receiver clock included."""
@@ -238,7 +157,7 @@ class RangeCorrections(_Settings):
     sagnac: Literal["none", "applied", "pseudorange"] = "none"
 
 
-class CsvTime(_Settings):
+class CsvTime(Settings):
     """Where the time of a row stands. base: ``gps`` counts from 1980-01-06, ``gps_unix`` from 1970 without leap seconds (as
     RTKLIB does), ``gps_tow`` from the start of the GPS week (week_column, or ``gps_week`` of the input), ``utc`` and ``tai``
     from 1970, ``boot`` from an unknown zero (see `ImuInput`); ``datetime_*`` is a date and time of day, in one column or
@@ -250,7 +169,7 @@ class CsvTime(_Settings):
     week_column: Column | None = None
 
 
-class CsvMapping(_Settings):
+class CsvMapping(Settings):
     """Meaning of a text file (or of a matrix in a MATLAB file) without a layout of its own.
 
     match: pattern of the file's name. columns: by quantity, the name or the number (from 1) of its column. status: by the
@@ -272,131 +191,7 @@ class CsvMapping(_Settings):
     satellite_blocks: dict[System, Annotated[int, Field(ge=1)]] = Field(default_factory=dict)
 
 
-MessageQuantity = (
-    Quantity
-    | Literal[
-        "speed",
-        "course",
-        "east",
-        "north",
-        "up",
-        "std_h",
-        "std_vel",
-        "var_n",
-        "var_e",
-        "var_d",
-        "var_vn",
-        "var_ve",
-        "var_vd",
-        "lat_plus",
-        "lon_plus",
-        "height_plus",
-    ]
-)
-"""What a field of a message can hold, besides: ``speed`` and ``course`` (clockwise from north) over ground; ``east``,
-``north``, ``up`` of ``origin_deg_m``; one standard deviation for both horizontal axes, or for all of a velocity;
-variances; and what is added to latitude, longitude and height (finer digits, the geoid separation of a height above mean
-sea level)."""
-
-
-class MessageTime(_Settings):
-    """Which field of a message is its time. base: ``auto`` is a stamp like that of a header, to which the ``time_base`` of its
-    role applies; ``gps_tow`` counts from the start of the GPS week, of week_column or else the one nearest to the recorder's
-    clock; the others as in `CsvTime`."""
-
-    column: str
-    unit: Literal["s", "ms", "us", "ns"] = "ns"
-    base: Literal["auto", "gps", "gps_unix", "gps_tow", "utc", "tai"] = "auto"
-    week_column: str | None = None
-
-
-class MessageMapping(_Settings):
-    """Meaning of the messages of a topic, or of a type, in any container.
-
-    topic, type: patterns; of those given, both must fit. columns: by quantity, the path of its field (``pose.position.x``,
-    ``rates[0]``, ``flags & 192``). units: by quantity (or ``gyro``, ``accel``, ``vel`` for all of a kind) a unit, with a factor
-    before it where there is one (``1e-7 deg``). axes: where x, y, z of an inertial sensor point. increments: its samples are
-    increments since the last one. time: without it the header's stamp, else the recorder's. status: by the text of the status
-    field, the kind of fix. no_fix: values of fields at which there is no fix. beside: types whose message of the same key is
-    joined to each; their fields are then ``Type.field``. origin_deg_m: of ``east``, ``north``, ``up``. rank: of several
-    channels that can serve, that of the lowest is taken."""
-
-    topic: str | None = None
-    type: str | None = None
-    role: Literal["imu", "fix", "velocity", "attitude", "reference"]
-    columns: dict[MessageQuantity, str] = Field(min_length=1, validation_alias=AliasChoices("columns", "fields"))
-    units: dict[str, str] = Field(default_factory=dict)
-    angle_unit: Literal["deg", "rad"] = "deg"
-    time: MessageTime | None = None
-    status: dict[str, StatusName] = Field(default_factory=dict)
-    no_fix: dict[str, tuple[float, ...]] = Field(default_factory=dict)
-    axes: str = "frd"
-    increments: bool = False
-    beside: tuple[str, ...] = ()
-    key: str | None = None
-    origin_deg_m: Vector | None = None
-    rank: int = 0
-    note: str = ""
-
-    @model_validator(mode="after")
-    def _check_match(self) -> "MessageMapping":
-        if self.topic is None and self.type is None:
-            raise ValueError("a mapping of messages needs topic or type, such as topic = '/gps/raw'")
-        if self.beside and self.key is None:
-            raise ValueError("beside needs key, the field that is equal in the messages to join")
-        return self
-
-    @field_validator("axes")
-    @classmethod
-    def _check_axes(cls, axes: str) -> str:
-        return check_axes(axes)
-
-    @field_validator("units")
-    @classmethod
-    def _check_units(cls, units: dict[str, str]) -> dict[str, str]:
-        for text in units.values():
-            unit_factor(text)
-        return units
-
-
-_UNITS = {
-    "rad": 1.0,
-    "deg": pi / 180,
-    "arcsec": pi / 648_000,
-    "m": 1.0,
-    "cm": 0.01,
-    "mm": 0.001,
-    "km": 1000.0,
-    "ft": 0.3048,
-    "m/s": 1.0,
-    "cm/s": 0.01,
-    "mm/s": 0.001,
-    "km/h": 1 / 3.6,
-    "kn": 1852 / 3600,
-    "ft/s": 0.3048,
-    "rad/s": 1.0,
-    "deg/s": pi / 180,
-    "m/s2": 1.0,
-    "g": 9.80665,
-    "mg": 9.80665e-3,
-    "m2": 1.0,
-    "m2/s2": 1.0,
-}
-
-
-def unit_factor(text: str) -> float:
-    """What a number in a unit (``mm``, ``1e-7 deg``, ``0.5 g``) is multiplied by to get it in SI and radians. Raises
-    ValueError."""
-    factor, _, unit = text.strip().rpartition(" ")
-    try:
-        return float(factor or 1) * _UNITS[unit]
-    except (KeyError, ValueError) as error:
-        raise ValueError(
-            f"no unit '{text}'; known are {', '.join(_UNITS)}, each with a factor before it, as '1e-7 deg'"
-        ) from error
-
-
-class InputSettings(_Settings):
+class InputSettings(Settings):
     """Everything about the input. Where a channel is not named, the only one of a fitting type is taken; ``none`` takes none.
     leap_seconds: a table in the IERS format replacing the built-in one. gps_week: full week
     where a file holds only seconds of week. utc_date: date of the first sentence where an NMEA file holds none."""

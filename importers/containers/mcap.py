@@ -97,10 +97,10 @@ class McapLog:
             return ProtobufDecoder(schema.name, schema.data)
         if encoding in ("cdr", "ros1"):
             from importers.decoding.ros import RosDecoder
-            from importers.decoding.ros_definitions import find_type
+            from importers.decoding.ros_definitions import find_types
 
             language = "idl" if schema.encoding == _IDL else "msg"
-            return RosDecoder(find_type(schema.name, schema.data.decode(errors="replace"), language, encoding), encoding)
+            return RosDecoder(find_types(schema.name, schema.data.decode(errors="replace"), language, encoding), encoding)
         raise LogError(f"message encoding {encoding!r} is not supported; cdr, ros1, json and protobuf are")
 
     def _scan(self) -> Directory:

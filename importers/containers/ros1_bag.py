@@ -61,10 +61,10 @@ class Ros1Bag:
 
     def _decoder(self, number: int) -> Decoder:
         from importers.decoding.ros import RosDecoder
-        from importers.decoding.ros_definitions import find_type
+        from importers.decoding.ros_definitions import find_types
 
         connection = self._directory.connections[number]
-        return RosDecoder(find_type(connection.type, connection.definition, "msg", "ros1"), "ros1")
+        return RosDecoder(find_types(connection.type, connection.definition, "msg", "ros1"), "ros1")
 
     def _scan(self) -> Directory:
         """The directory of a bag without a usable index, from all its records."""

@@ -95,12 +95,12 @@ class SqliteStorage:
 
     def _decoder(self, number: int) -> Decoder:
         from importers.decoding.ros import RosDecoder
-        from importers.decoding.ros_definitions import find_type
+        from importers.decoding.ros_definitions import find_types
 
         _, kind, encoding = self._topics[number]
         if encoding != "cdr":
             raise LogError(f"serialization format {encoding!r} is not supported; cdr is")
-        return RosDecoder(find_type(kind, *self._definitions.get(kind, ("", "msg")), "cdr"), "cdr")
+        return RosDecoder(find_types(kind, *self._definitions.get(kind, ("", "msg")), "cdr"), "cdr")
 
     def _note(self, text: str) -> None:
         if text not in self.notes:

@@ -20,19 +20,23 @@ class RosDecoder:
     """Decodes the messages of one channel.
 
     Layouts found are kept and tried first on the next block; a channel with more than a few layouts (strings of ever new
-    length) goes on message by message. Arrays of variable length, and arrays of messages, are object columns.
+    length) goes on message by message. Arrays of variable length, and arrays of messages, are object columns. ros_types: the
+    type, or what it is in several releases: the one that decodes the first message is meant.
     """
 
-    def __init__(self, ros_type: RosType, encoding: str) -> None:
-        self._type = ros_type
+    def __init__(self, ros_types: RosType | tuple[RosType, ...], encoding: str) -> None:
+        self._releases = ros_types if isinstance(ros_types, tuple) else (ros_types,)
+        self._type = self._releases[0]
         self._encoding = encoding
         self._layouts: list[Layout] = []
-        self._derived = 0 if ros_type.fixed else _MAX_LAYOUTS
+        self._derived = 0 if self._type.fixed else _MAX_LAYOUTS
 
     def decode(self, buffer: Buffer, start: Offsets, stop: Offsets) -> Decoded:
         """See `Decoder`; equal to rosbags' own decoding, bit for bit."""
         if self._encoding == "cdr":
             buffer, start, stop = _expand(buffer, start, stop)
+        if len(self._releases) > 1 and len(start):
+            self._choose_release(buffer[start[0] : stop[0]].tobytes())
         pieces: list[tuple[NDArray[np.intp], Columns]] = []
         left = np.arange(len(start))
         for layout in self._layouts:
@@ -53,6 +57,16 @@ class RosDecoder:
         if len(singly) or not pieces:
             pieces.append(self._decode_singly(buffer, start, stop, singly))
         return Decoded(*_in_order(pieces), reason=f"not decodable as {self._type.name}")
+
+    def _choose_release(self, message: bytes) -> None:
+        for release in self._releases:
+            self._type = release
+            if self._deserialize(message) is not None:
+                self._releases = (release,)
+                break
+        else:
+            self._type = self._releases[0]
+        self._derived = 0 if self._type.fixed else _MAX_LAYOUTS
 
     def _take(
         self,

@@ -18,7 +18,7 @@ from importers.decoding.leaves import Kind, Leaf
 from importers.drivers.packages import definitions_of
 from navreplay.timeline import LogError
 
-__all__ = ["RosType", "find_type", "normalize_msgtype"]
+__all__ = ["RosType", "find_type", "find_types", "normalize_msgtype"]
 
 _IDL_SEPARATOR = "=" * 80 + "\n"
 _EMPTY = "structure_needs_at_least_one_member"
@@ -51,13 +51,20 @@ class RosType:
     fixed: bool
 
 
+def find_types(name: str, definition: str, language: str, encoding: str) -> tuple[RosType, ...]:
+    """The type as `find_type` gives it; where the log does not define it, as each release of its driver does."""
+    package = normalize_msgtype(name).partition("/")[0]
+    releases = 1 if definition.strip() else max(map(len, definitions_of(package).values()), default=1)
+    return tuple(find_type(name, definition, language, encoding, release) for release in range(releases))
+
+
 @lru_cache(maxsize=256)
-def find_type(name: str, definition: str, language: str, encoding: str) -> RosType:
+def find_type(name: str, definition: str, language: str, encoding: str, release: int = 0) -> RosType:
     """The type of this name (either style).
 
     definition: text out of the log, empty where it has none (then the standard types of ROS are searched, and drivers').
-    language: ``msg`` or ``idl``. encoding: ``cdr`` or ``ros1``. Raises LogError for an unknown type or a definition that does
-    not parse.
+    language: ``msg`` or ``idl``. encoding: ``cdr`` or ``ros1``. release: of a driver, 0 the newest. Raises LogError for an
+    unknown type or a definition that does not parse.
     """
     name = normalize_msgtype(name)
     if definition.strip():
@@ -66,8 +73,8 @@ def find_type(name: str, definition: str, language: str, encoding: str) -> RosTy
         # Recorders since ROS 2 Iron store definitions, so a log without them is at most as new as Humble.
         store = get_typestore(Stores.ROS1_NOETIC if encoding == "ros1" else Stores.ROS2_HUMBLE)
         definitions = definitions_of(name.partition("/")[0])
-        for known, text in definitions.items() if name in definitions else ():
-            store.register(get_types_from_msg(text, known))
+        for known, texts in definitions.items() if name in definitions else ():
+            store.register(get_types_from_msg(texts[min(release, len(texts) - 1)], known))
     if name not in store.fielddefs:
         raise LogError(
             f"type {name} is not defined in the log, is no standard type of ROS and none of a driver known here; record its "

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from importers.message_settings import MessageMapping
 from importers.roles.mapped_messages import map_table
 from importers.rows.log import Channel, Table
-from importers.settings import MessageMapping
 from navreplay.geodesy.time_scales import LEAP_SECONDS
 from navreplay.timeline import Floats, LogError
 

@@ -13,9 +13,10 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from importers.drivers.packages import definitions_of
 from importers.formats import open_log
 from importers.load import load_timeline
+from importers.message_settings import MessageMapping
 from importers.roles.mapped_messages import map_table
 from importers.rows.log import Table
-from importers.settings import InputSettings, MessageMapping
+from importers.settings import InputSettings
 from navreplay.geodesy.time_scales import LEAP_SECONDS, gps_from_utc
 from navreplay.timeline import FixStatus, LogError
 from pipelines.config.spec import load_config
@@ -128,12 +129,12 @@ def test_configuration_is_checked(tmp_path: Path, text: str, problem: str) -> No
 # --- through a bag without definitions, as ROS 2 Humble writes it
 
 
-def write_humble(path: Path, messages: list[tuple[str, str, int, dict[str, Any]]]) -> Path:
+def write_humble(path: Path, messages: list[tuple[str, str, int, dict[str, Any]]], release: int = 0) -> Path:
     """A bag whose messages are filled as told, every other field zero; the definitions are taken out of it."""
     store = get_typestore(Stores.ROS2_HUMBLE)
     for package in {kind.partition("/")[0] for _, kind, _, _ in messages}:
-        for name, text in definitions_of(package).items():
-            store.register(get_types_from_msg(text, name))
+        for name, texts in definitions_of(package).items():
+            store.register(get_types_from_msg(texts[min(release, len(texts) - 1)], name))
     with Writer2(path, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
         connections: dict[str, Any] = {}
         for topic, kind, t_ns, values in messages:
@@ -203,6 +204,36 @@ def test_fixes_of_a_driver_need_no_mapping_and_no_definition(tmp_path: Path, kin
     assert np.abs(fixes.t_ns - utc).max() <= 1_000_000
 
 
+@pytest.mark.parametrize("release", [0, 1])
+def test_the_release_of_a_driver_is_found(tmp_path: Path, release: int) -> None:
+    gnss, imu = "px4_msgs/msg/SensorGps", "px4_msgs/msg/SensorCombined"
+    moving = {"gyro_rad": [0.1, 0.2, 0.3], "accelerometer_m_s2": [0.0, 0.0, -9.8]}
+    messages = []
+    for i in range(N):
+        stamp = {"timestamp": i * 100_000}
+        messages.append(("/g", gnss, START_NS + i * 10**8, DRIVERS[gnss] | stamp))
+        messages.append(("/i", imu, START_NS + i * 10**8, moving | stamp))
+    timeline = load_timeline([write_humble(tmp_path / "bag", messages, release)])
+    assert timeline.fixes is not None
+    assert timeline.imu is not None
+    assert np.allclose(np.degrees(timeline.fixes.lla[:, :2]), [LAT, LON])
+    assert (timeline.fixes.status == FixStatus.FIXED).all()
+    assert np.allclose(timeline.imu.accel, [0.0, 0.0, -9.8])
+
+
+@pytest.mark.parametrize("role", ["reference", "fix"])
+def test_a_topic_may_tell_what_its_type_does_not(tmp_path: Path, role: str) -> None:
+    kind = "sensor_msgs/msg/NavSatFix"
+    values = {"latitude": LAT, "longitude": LON, "altitude": HEIGHT}
+    topics = ["/gnss_1/llh_position", "/ekf/llh_position"]
+    messages = [(topic, kind, START_NS + i * 10**8, values) for i in range(N) for topic in topics]
+    settings = {"fix": {"channel": "/ekf/llh_position"}} if role == "fix" else {}
+    timeline = load_timeline([write_humble(tmp_path / "bag", messages)], InputSettings.model_validate(settings))
+    roles = {use.name: use.role for use in timeline.provenance.channels}
+    assert roles["/ekf/llh_position"] == "reference"
+    assert roles["/ekf/llh_position#fix" if role == "fix" else "/gnss_1/llh_position"] == "fix"
+
+
 def test_covariances_beside_a_position(tmp_path: Path) -> None:
     package = "septentrio_gnss_driver/msg/"
     messages = []
@@ -242,8 +273,8 @@ def test_one_topic_with_two_types(tmp_path: Path, second: str) -> None:
     from mcap.writer import Writer
 
     store = get_typestore(Stores.ROS2_HUMBLE)
-    for name, text in (definitions_of("gps_msgs") | definitions_of("nmea_msgs")).items():
-        store.register(get_types_from_msg(text, name))
+    for name, texts in (definitions_of("gps_msgs") | definitions_of("nmea_msgs")).items():
+        store.register(get_types_from_msg(texts[0], name))
     with (tmp_path / "log.mcap").open("wb") as file:
         writer = Writer(file)
         writer.start()
