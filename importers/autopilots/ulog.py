@@ -4,8 +4,8 @@ Source: PX4 guide 1.16, "ULog File Format".
 """
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,21 +67,39 @@ def open_ulog(path: str) -> ULog:
     landmarks = np.unique(np.concatenate([sync[sync >= _HEADER], _appended(path, flags)])).astype(np.int64)
     kind, start, size, lost = scan_ulog(buffer, _HEADER, known, landmarks)
     formats = dict(_format(_text(buffer, start[i], size[i])) for i in np.flatnonzero(kind == ord("F")))
-    data = np.flatnonzero(kind == ord("D"))
-    data = data[size[data] >= 2]
-    heads = gather(buffer, start[data], 2).astype(np.int64)
-    number = heads[:, 0] + 256 * heads[:, 1]
-    topics: dict[tuple[str, int], Topic] = {}
+    return ULog(buffer, _topics(buffer, kind, start, size, formats), lost)
+
+
+def _topics(
+    buffer: Buffer,
+    kind: NDArray[np.uint8],
+    start: Offsets,
+    size: NDArray[np.int64],
+    formats: Mapping[str, tuple[str, ...]],
+) -> dict[tuple[str, int], Topic]:
+    """The topics that are subscribed and have a definition, with their messages."""
+    data = np.flatnonzero((kind == ord("D")) & (size >= 2))
+    numbers = gather(buffer, start[data], 2).astype(np.int64) @ [1, 256]
+    order = np.argsort(numbers, kind="stable")
+    bounds = np.searchsorted(numbers[order], np.arange(65_537))
+    parts: dict[tuple[str, int], dict[int, Topic]] = {}
     for i in np.flatnonzero((kind == ord("A")) & (size > 3)):
         instance, low, high = (int(byte) for byte in buffer[start[i] : start[i] + 3])
-        name = _text(buffer, start[i] + 3, size[i] - 3)
+        name, number = _text(buffer, start[i] + 3, size[i] - 3), low + 256 * high
         layout = _layout(name, formats, 0)
-        if layout is None or "timestamp" not in (layout.names or ()):
+        known = parts.setdefault((name, instance), {})
+        if number in known or layout is None or "timestamp" not in (layout.names or ()):
             continue
-        own = data[number == low + 256 * high]
+        own = data[order[bounds[number] : bounds[number + 1]]]
         whole = size[own] - 2 >= _needed(layout)
-        topics[name, instance] = Topic(name, instance, layout, start[own[whole]] + 2, int((~whole).sum()))
-    return ULog(buffer, topics, lost)
+        known[number] = Topic(name, instance, layout, start[own[whole]] + 2, int((~whole).sum()))
+    return {key: _joined(list(known.values())) for key, known in parts.items() if known}
+
+
+def _joined(parts: Sequence[Topic]) -> Topic:
+    """One topic of those subscribed again under another number, as data appended after a crash may be."""
+    places = np.sort(np.concatenate([part.start for part in parts]))
+    return replace(parts[0], start=places, short=sum(part.short for part in parts))
 
 
 def _appended(path: str, flags: bytes) -> NDArray[np.int64]:

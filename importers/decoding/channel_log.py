@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Sequence
 
+import numpy as np
+
 from importers.decoding.channel_reading import require_channels
 from importers.rows.log import Channel, Table
 
@@ -26,4 +28,5 @@ class ChannelLog:
     def read(self, names: tuple[str, ...]) -> dict[str, Table]:
         """See `Log`."""
         require_channels(self.path, names, self.channels())
-        return {name: self._readers[name][1]() for name in names}
+        with np.errstate(invalid="ignore", over="ignore"):  # bytes of damaged numbers are no news: what they give is screened
+            return {name: self._readers[name][1]() for name in names}

@@ -126,6 +126,8 @@ def _gnss_motion(imu: ImuSeries, fixes: GnssFixSeries) -> _Motion:
 
 def _thin(t_ns: Times) -> NDArray[np.intp]:
     """Indices of the first time in every second: differences over shorter intervals are mostly noise."""
+    if len(t_ns) == 0:
+        return np.empty(0, dtype=np.intp)
     return np.unique((t_ns - t_ns[0] + _JITTER_NS) // _SHORTEST_INTERVAL_NS, return_index=True)[1]
 
 

@@ -46,6 +46,8 @@ def read_gpx(path: str, leap: LeapSeconds) -> Table:
             raise LogError(f"{path}: is no readable GPX document: {error}; copy the file again") from error
         rejected[f"damaged from line {error.position[0]} on"] = 1
         total += 1
+    except (LookupError, ValueError) as error:
+        raise LogError(f"{path}: declares an encoding that cannot be read: {error}") from error
     except OSError as error:
         raise LogError(f"{path}: cannot be read: {error.strerror}") from error
     if not points:
@@ -82,6 +84,8 @@ def _point(element: ElementTree.Element) -> _Point | None:
         height = float(parts["ele"]) + float(parts.get("geoidheight") or 0.0) if parts.get("ele") else 0.0
         time = datetime.fromisoformat(parts["time"])
     except (KeyError, ValueError):
+        return None
+    if not 1980 <= time.year < 2200:
         return None
     since = (time if time.tzinfo is not None else time.replace(tzinfo=UTC)) - _EPOCH
     stamp = (since.days * 86_400 + since.seconds) * _SECOND + since.microseconds * 1000

@@ -45,12 +45,13 @@ def read_sbet(path: str, gps_week: int | None) -> Table:
     t_ns = gps_from_week_tow(unwrap_weeks(gps_week, seconds, path), seconds)
     wander = rows["wander"]
     x, y = rows["vel"][:, 0], rows["vel"][:, 1]
-    north, east = x * np.cos(wander) + y * np.sin(wander), y * np.cos(wander) - x * np.sin(wander)
-    columns = {
-        "t_gps_ns": t_ns,
-        "lla": rows["lla"].astype(np.float64),
-        "vel_n": np.column_stack([north, east, rows["vel"][:, 2]]),
-        "q_nb": quat_from_euler(rows["roll"], rows["pitch"], rows["heading"] - wander),
-    }
+    with np.errstate(invalid="ignore", over="ignore"):  # of damaged numbers, which are screened later
+        north, east = x * np.cos(wander) + y * np.sin(wander), y * np.cos(wander) - x * np.sin(wander)
+        columns = {
+            "t_gps_ns": t_ns,
+            "lla": rows["lla"].astype(np.float64),
+            "vel_n": np.column_stack([north, east, rows["vel"][:, 2]]),
+            "q_nb": quat_from_euler(rows["roll"], rows["pitch"], rows["heading"] - wander),
+        }
     rejected = {} if timed.all() else {"no time": int((~timed).sum())}
     return Table(t_ns, columns, len(timed), rejected)

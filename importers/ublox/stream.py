@@ -94,7 +94,8 @@ class UbxLog:
             "ESF-MEAS": lambda: self._sensor(_ESF_MEAS),
             _NMEA: lambda: cast(Table, self._sentences),
         }
-        return {name: readers[name]() for name in names}
+        with np.errstate(invalid="ignore", over="ignore"):  # of damaged numbers, which are screened later
+            return {name: readers[name]() for name in names}
 
     def _read_sentences(self, utc_date: date | None) -> Table | None:
         """Positions of the NMEA sentences between the messages, where there are any; a note where they cannot be used."""
