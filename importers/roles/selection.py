@@ -172,8 +172,10 @@ def _topic(channel: Channel) -> str:
 
 def _only_one(found: list[Choice], role: str) -> list[Choice]:
     """One channel, which may continue from file to file under the same name and type, or on its topic with another type."""
+    if _is_open(found):
+        found = [choice for choice in found if _is_readable(choice)] or found
     names = {(choice.channel.name, choice.channel.type) for choice in found}
-    if len(names) > 1 and len({_topic(choice.channel) for choice in found}) > 1:
+    if _is_open(found):
         listed = "; ".join(f"{name} ({type})" for name, type in sorted(names))
         example = sorted(names)[0][0]
         raise LogError(
@@ -181,3 +183,13 @@ def _only_one(found: list[Choice], role: str) -> list[Choice]:
             f"for instance --set {SETTING[role]}={example}"
         )
     return found
+
+
+def _is_open(found: list[Choice]) -> bool:
+    return len({_topic(choice.channel) for choice in found}) > 1
+
+
+def _is_readable(choice: Choice) -> bool:
+    """Whether any message of the channel can be decoded: one that cannot is no choice."""
+    name = choice.channel.name
+    return len(choice.log.read((name,))[name].log_time_ns) > 0

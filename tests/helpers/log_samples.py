@@ -39,6 +39,12 @@ def imu(store: Typestore, t_ns: int, values: Iterable[float], frame_id: str = "i
     )
 
 
+def nav_sat_fix(store: Typestore, t_ns: int, lla: tuple[float, float, float] = (48.0, 11.0, 500.0)) -> Any:
+    """sensor_msgs/NavSatFix at a place [deg, deg, m] with a standard deviation of a metre."""
+    status = store.types["sensor_msgs/msg/NavSatStatus"](0, 1)
+    return store.types[FIX](header(store, t_ns, "gnss"), status, *lla, np.eye(3).ravel(), 2)
+
+
 def imu_rows(count: int) -> np.ndarray:
     """(count, 37) values, all different."""
     return np.random.default_rng(5).normal(size=(count, 37))
