@@ -21,6 +21,7 @@ __all__ = ["Clock", "Joined", "Source", "account", "join_sources"]
 
 _EARLIEST_UNIX_NS = 631_152_000 * 10**9
 _MOST_DELAY_NS = 5e9
+_RESTART_NS = 10**9
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -170,18 +171,30 @@ def _counts_from_power_on(stamps: Times, table: Table) -> bool:
     """Whether stamps are of no calendar, but advance with the clock of the recorder, which is."""
     if len(stamps) < 2 or np.median(stamps) >= _EARLIEST_UNIX_NS or np.median(table.log_time_ns) < _EARLIEST_UNIX_NS:
         return False
-    low, high = np.quantile((table.log_time_ns - stamps).astype(np.float64), [0.05, 0.95])
-    return bool(high - low < _MOST_DELAY_NS)
+    delay = table.log_time_ns - stamps - _least_delays(stamps, table.log_time_ns)
+    return bool(np.quantile(delay.astype(np.float64), 0.95) < _MOST_DELAY_NS)
 
 
-def _boot_shift(stamps: Times, table: Table, clock: Clock) -> tuple[int, str]:
-    """What to add to stamps from power-on to get UTC [ns]. By the recorder it is the least delay seen, since delays only
+def _boot_shift(stamps: Times, table: Table, clock: Clock) -> tuple[Times, str]:
+    """What to add to stamps (n,) from power-on to get UTC [ns]. By the recorder it is the least delay seen, since delays only
     add."""
     for reference in clock.time_references:
         own = stamp_column(reference)
         if own is not None and len(own) and "time_ref" in reference.columns:
             shift = int(np.median(reference.columns["time_ref"].astype(np.int64) - own.astype(np.int64)))
-            return shift, "they were set to UTC by the time-reference channel"
-    if len(stamps) == 0:
-        return 0, "but there is none"
-    return int(np.min(table.log_time_ns - stamps)), "they were set to UTC by the clock of the recorder (smallest delay)"
+            return np.full(len(stamps), shift), "they were set to UTC by the time-reference channel"
+    restarts = int((np.diff(stamps) < -_RESTART_NS).sum())
+    told = "they were set to UTC by the clock of the recorder (smallest delay)"
+    if restarts:
+        told += f", anew behind each of {restarts} restarts" if restarts > 1 else ", anew behind a restart"
+    return _least_delays(stamps, table.log_time_ns), told
+
+
+def _least_delays(stamps: Times, log_time_ns: Times) -> Times:
+    """The least delay (n,) between stamp and recorder [ns] since the sensor's clock last began again."""
+    shift = np.empty(len(stamps), dtype=np.int64)
+    begins = np.flatnonzero(np.diff(stamps) < -_RESTART_NS) + 1
+    for piece in np.split(np.arange(len(stamps)), begins):
+        if len(piece):
+            shift[piece] = np.min(log_time_ns[piece] - stamps[piece])
+    return shift
