@@ -1,6 +1,5 @@
 """Formats that can be read, and opening a log by what it holds."""
 
-import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +16,14 @@ from importers.roles.mapped_log import MappedLog
 from importers.rows.clock import leap_seconds
 from importers.rows.log import Log
 from importers.settings import InputSettings
+from importers.streams import (
+    open_dataflash_log,
+    open_novatel_stream,
+    open_rtcm_stream,
+    open_sbf_stream,
+    open_ubx_stream,
+    open_ulog,
+)
 from importers.text.csv_layouts import find_layout, read_layout
 from importers.text.csv_mapping import find_mapping, read_mapped
 from importers.text.csv_ranges import OWN_RANGES
@@ -29,7 +36,6 @@ from importers.text.tum import is_tum, read_tum
 from importers.text.unix_compress import is_compressed, unpack
 from importers.trajectories.gpx import is_gpx, read_gpx
 from importers.trajectories.sbet import is_sbet, read_sbet
-from importers.ublox.stream import UbxLog, is_ubx
 from navreplay.geodesy.time_scales import LEAP_SECONDS
 from navreplay.plugins import load_plugins
 from navreplay.timeline import LogError
@@ -37,13 +43,6 @@ from navreplay.timeline import LogError
 __all__ = ["FORMATS", "Format", "known_formats", "open_log"]
 
 _HEAD_BYTES = 20_000
-_FAR_BYTES = 4_000_000
-"""How far a stream is searched for its first message that is read."""
-
-
-# What a stream of these at least holds; their readers, which take a while to import, look closer.
-_NOVATEL = re.compile(rb"\xaaD[\x12\x13]|[#%][A-Z0-9]+A,")
-_RTCM = re.compile(rb"\xd3[\x00-\x03]")
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,62 +227,6 @@ def _open_rinex_navigation(path: str, head: bytes, settings: InputSettings) -> L
     return TextLog(path, "rinex", "rinex/navigation", lambda: read_rinex_navigation(path, leap_seconds(settings.leap_seconds)))
 
 
-def _open_ubx(path: str, head: bytes, settings: InputSettings) -> Log | None:
-    if not is_ubx(head) and not _ubx_later(path, head):
-        return None
-    return UbxLog(path, leap_seconds(settings.leap_seconds), settings.utc_date)
-
-
-def _open_novatel(path: str, head: bytes, settings: InputSettings) -> Log | None:
-    if _NOVATEL.search(head) is None:
-        return None
-    from importers.receivers.novatel import is_novatel, open_novatel
-
-    return open_novatel(path) if is_novatel(head) else None
-
-
-def _open_sbf(path: str, head: bytes, settings: InputSettings) -> Log | None:
-    if b"$@" not in head:
-        return None
-    from importers.receivers.sbf import is_sbf, open_sbf
-
-    return open_sbf(path) if is_sbf(head) else None
-
-
-def _open_rtcm(path: str, head: bytes, settings: InputSettings) -> Log | None:
-    if _RTCM.search(head) is None:
-        return None
-    from importers.receivers.rtcm import is_rtcm, open_rtcm
-
-    return open_rtcm(path, settings.gps_week) if is_rtcm(head) else None
-
-
-def _open_ulog(path: str, head: bytes, settings: InputSettings) -> Log | None:
-    if not head.startswith(b"ULog\x01\x12\x35"):
-        return None
-    from importers.autopilots.px4 import open_px4
-
-    return open_px4(path, leap_seconds(settings.leap_seconds))
-
-
-def _open_dataflash(path: str, head: bytes, settings: InputSettings) -> Log | None:
-    from importers.autopilots.dataflash import is_dataflash
-
-    if not is_dataflash(head):
-        return None
-    from importers.autopilots.ardupilot import open_ardupilot
-
-    return open_ardupilot(path)
-
-
-def _ubx_later(path: str, head: bytes) -> bool:
-    """Whether a stream that begins with other messages, of NMEA or UBX, holds some that are read further on."""
-    if b"\xb5\x62" not in head and not head.startswith(b"$"):
-        return False
-    with Path(path).open("rb") as file:
-        return is_ubx(file.read(_FAR_BYTES))
-
-
 def _open_sp3(path: str, head: bytes, settings: InputSettings) -> Log | None:
     if not is_sp3(_text(head)):
         return None
@@ -310,17 +253,19 @@ FORMATS: tuple[Format, ...] = (
     Format("mcap", "MCAP with ROS 2, ROS 1, Foxglove JSON or protobuf messages", (".mcap",), _open_mcap),
     Format("ros1", "ROS 1 bag", (".bag",), _open_ros1),
     Format("ros2", "ROS 2 bag: the folder, or its .db3 file", (".db3",), _open_ros2),
-    Format("ubx", "u-blox stream: RXM-RAWX, RXM-SFRBX, NAV-PVT, NAV-HPPOSLLH, ESF-RAW, ESF-MEAS ...", (".ubx",), _open_ubx),
+    Format(
+        "ubx", "u-blox stream: RXM-RAWX, RXM-SFRBX, NAV-PVT, NAV-HPPOSLLH, ESF-RAW, ESF-MEAS ...", (".ubx",), open_ubx_stream
+    ),
     Format(
         "novatel",
         "NovAtel OEM stream, binary or ASCII: RANGE, BESTPOS, BESTVEL, RAWIMUSX, INSPVAX ...",
         (".gps",),
-        _open_novatel,
+        open_novatel_stream,
     ),
-    Format("sbf", "Septentrio SBF: MeasEpoch, PVTGeodetic, ExtSensorMeas, INSNavGeod ...", (".sbf",), _open_sbf),
-    Format("rtcm", "RTCM 3 stream: MSM4 to MSM7, ephemerides", (".rtcm", ".rtcm3"), _open_rtcm),
-    Format("ulog", "flight log of PX4 (ULog)", (".ulg",), _open_ulog),
-    Format("dataflash", "flight log of ArduPilot (DataFlash)", (".bin",), _open_dataflash),
+    Format("sbf", "Septentrio SBF: MeasEpoch, PVTGeodetic, ExtSensorMeas, INSNavGeod ...", (".sbf",), open_sbf_stream),
+    Format("rtcm", "RTCM 3 stream: MSM4 to MSM7, ephemerides", (".rtcm", ".rtcm3"), open_rtcm_stream),
+    Format("ulog", "flight log of PX4 (ULog)", (".ulg",), open_ulog),
+    Format("dataflash", "flight log of ArduPilot (DataFlash)", (".bin",), open_dataflash_log),
     Format("csv", "any table of numbers, or matrix of a MATLAB file, by [[input.csv]]", (".csv", ".txt", ".mat"), _open_mapped),
     Format("navreplay", "this program's own CSV: imu, fix, trajectory, solution", (".csv",), _open_own),
     Format("smartphone", "Android raw measurements (device_gnss.csv)", (".csv",), _open_smartphone),

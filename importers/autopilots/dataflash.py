@@ -15,7 +15,7 @@ from importers.containers.file_bytes import map_file
 from importers.decoding.blocks import Buffer, Offsets
 from importers.decoding.byte_rows import records
 
-__all__ = ["DataFlash", "is_dataflash", "open_dataflash"]
+__all__ = ["DataFlash", "open_dataflash"]
 
 _HEAD = b"\xa3\x95"
 _FORMAT_TYPE = 0x80
@@ -47,11 +47,6 @@ class DataFlash:
         layout, scales = self.layouts[name]
         rows = records(self.buffer, self.start[name], layout)
         return {field: rows[field] if scale == 1.0 else rows[field] * scale for field, scale in scales.items()}
-
-
-def is_dataflash(head: bytes) -> bool:
-    """Whether a file begins with the definition of a message."""
-    return head[:3] == _HEAD + bytes([_FORMAT_TYPE]) and len(head) >= _FORMAT_LENGTH
 
 
 def open_dataflash(path: str) -> DataFlash:

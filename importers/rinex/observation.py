@@ -66,7 +66,8 @@ def read_rinex_observation(path: str, settings: RangeInput, leap: LeapSeconds) -
         for name in sorted({name for each in wanted for name in each}):
             own = (system == ord(name)) & (layout == number)
             types, codes = layouts.types[number].get(name, []), by_system.get(name, [])
-            parts += _read_system(text.lines, rows[own], t_ns[own], types, codes, layouts.channels, rejected)
+            scales = [layouts.factors[number].get((name, type), 1.0) for type in types]
+            parts += _read_system(text.lines, rows[own], t_ns[own], types, scales, codes, layouts.channels, rejected)
     if not parts:
         raise LogError(f"{path}: the observation file holds no pseudorange of a chosen signal; is it cut behind its header?")
     columns = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
@@ -85,28 +86,44 @@ def _wanted(types: Mapping[str, list[str]], settings: RangeInput) -> dict[str, l
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Layouts:
-    """What the columns mean: types[i], by system, from line first[i] of the body on. channels: of GLONASS satellites."""
+    """What the columns mean: types[i], by system, and factors[i], by system and type, that numbers were multiplied by, from
+    line first[i] of the body on. channels: of GLONASS satellites."""
 
     first: NDArray[np.int64]
     types: tuple[dict[str, list[str]], ...]
+    factors: tuple[Mapping[tuple[str, str], float], ...]
     channels: Mapping[str, float]
 
 
 def _layouts(path: str, text: RinexText, marks: NDArray[np.intp]) -> _Layouts:
     """The types of the header, and each change of them by an event. Raises LogError."""
     first, types, told = [0], [_read_types(path, text.header)], [*text.header]
+    factors = [_read_factors(text.header, types[0])]
     flags = plain_numbers(text.lines.field(marks, 31, 1))
     ends = np.append(marks, len(text.lines))[1:]
     for mark, end in zip(marks[flags == _NEW_HEADER].tolist(), ends[flags == _NEW_HEADER].tolist(), strict=True):
         records = [header_line(text.lines.text(row)) for row in range(mark + 1, end)]
         told += records
-        changed = _read_types(path, records)
-        if changed:
-            first.append(mark)
-            types.append(types[-1] | changed)
+        first.append(mark)
+        types.append(types[-1] | _read_types(path, records))
+        factors.append(factors[-1] | _read_factors(records, types[-1]))
     if not types[0]:
         raise LogError(f"{path}: its header lists no observation types (SYS / # / OBS TYPES); the header is damaged")
-    return _Layouts(np.array(first), tuple(types), _glonass_channels(told))
+    return _Layouts(np.array(first), tuple(types), tuple(factors), _glonass_channels(told))
+
+
+def _read_factors(header: Sequence[tuple[str, str]], types: Mapping[str, list[str]]) -> dict[tuple[str, str], float]:
+    """SYS / SCALE FACTOR by system and type; a line that lists no types is for all of its system."""
+    factors: dict[tuple[str, str], float] = {}
+    system, factor = "", 1.0
+    for content, label in header:
+        if label != "SYS / SCALE FACTOR":
+            continue
+        if content[:1].strip():
+            system = content[0]
+            factor = float(content[2:6]) if content[2:6].strip().isdigit() and int(content[2:6]) > 0 else 1.0
+        factors |= {(system, name): factor for name in content[10:].split() or types.get(system, [])}
+    return factors
 
 
 def _read_types(path: str, header: Sequence[tuple[str, str]]) -> dict[str, list[str]]:
@@ -115,8 +132,6 @@ def _read_types(path: str, header: Sequence[tuple[str, str]]) -> dict[str, list[
     announced: dict[str, str] = {}
     system = ""
     for content, label in header:
-        if label == "SYS / SCALE FACTOR" and content.strip():
-            raise LogError(f"{path}: its header scales observations (SYS / SCALE FACTOR), which is not read; write it without")
         if label != "SYS / # / OBS TYPES":
             continue
         if content[:1].strip():
@@ -182,11 +197,12 @@ def _read_system(
     rows: NDArray[np.intp],
     t_ns: Times,
     types: list[str],
+    scales: list[float],
     codes: list[str],
     channels: Mapping[str, float],
     rejected: Counter[str],
 ) -> list[dict[str, np.ndarray]]:
-    """Columns of each code, of the lines of one system."""
+    """Columns of each code, of the lines of one system. scales: of each type, what its numbers were multiplied by."""
     width = 3 + _STRIDE * len(types)
     surplus = lines.stop[rows] - lines.start[rows] > width
     surplus[surplus] = (lines.field(rows[surplus], width, _STRIDE * _MORE) != ord(" ")).any(axis=1)
@@ -202,12 +218,15 @@ def _read_system(
         seen |= there
         signal = np.full(int(there.sum()), code)
         carrier = carrier_hz(sat[there], signal, channel[there])
-        part = {"t_gps_ns": t_ns[there], "sat": sat[there], "signal": signal, "pseudorange": plain_numbers(chars[there])}
+        pseudorange = plain_numbers(chars[there]) / scales[types.index(f"C{code}")]
+        part = {"t_gps_ns": t_ns[there], "sat": sat[there], "signal": signal, "pseudorange": pseudorange}
         for key, kind, factor in (("range_rate", "D", -SPEED_OF_LIGHT / carrier), ("cn0", "S", 1.0)):
             name = f"{kind}{code}"
-            known = name in types
-            values = plain_numbers(lines.field(rows[there], 3 + _STRIDE * types.index(name), _FIELD)) if known else np.nan
-            part[key] = values * factor * np.ones(len(signal))
+            values = np.full(len(signal), np.nan)
+            if name in types:
+                place = types.index(name)
+                values = plain_numbers(lines.field(rows[there], 3 + _STRIDE * place, _FIELD)) / scales[place]
+            part[key] = values * factor
         parts.append(part)
     rejected["no pseudorange"] += int((~seen).sum())
     return [part for part in parts if len(part["sat"])]

@@ -285,7 +285,7 @@ KINDS: dict[str, Kind] = {
     "rtklib/pos": Kind(_FIX, _text),
     "kf_gins/imu": Kind(("imu",), _text_means),
     "kf_gins/gnss": Kind(_FIX, _text),
-    "nmea": Kind(_FIX, _text, NMEA_NOTE, rank=2),
+    "nmea": Kind(_FIX, _text, NMEA_NOTE, rank=3),
     "tum": Kind(("reference",), _tum),
     "message/imu": Kind(("imu",), _mapped),
     "message/imu_si": Kind(("imu",), _text),

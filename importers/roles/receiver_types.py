@@ -50,7 +50,8 @@ _OWN_FUSION = "the receiver's own fusion with its inertial sensor serves as the 
 
 RECEIVER_TYPES: Mapping[str, ReceiverType] = {
     "ubx/NAV-PVT": ReceiverType(_FIX),
-    "ubx/NAV-HPPOSLLH": ReceiverType(_FIX, rank=1),
+    "ubx/NAV-HPPOSLLH": ReceiverType(_FIX, rank=2),
+    "ubx/NAV-POSLLH": ReceiverType(_FIX, rank=1),
     "ubx/HNR-PVT": ReceiverType(("reference", "fix"), _OWN_FUSION),
     "ubx/NAV-ATT": ReceiverType(("attitude",), automatic=False),
     "ubx/HNR-ATT": ReceiverType(("attitude",), automatic=False),

@@ -18,12 +18,17 @@ __all__ = [
     "COVARIANCE",
     "HIGH_PRECISION",
     "HIGH_RATE",
+    "POSITION",
     "SOLUTION",
+    "STATUS",
+    "VELOCITY",
     "Epochs",
     "attitudes",
     "high_rate",
     "precise_positions",
+    "separate_solutions",
     "solutions",
+    "state_times",
 ]
 
 _DATE = [("year", "<u2")] + [(name, "u1") for name in ("month", "day", "hour", "min", "sec", "valid")]
@@ -48,9 +53,26 @@ HIGH_RATE = np.dtype(
     + [("lat", "<i4"), ("height", "<i4"), ("hMSL", "<i4"), ("gSpeed", "<i4"), ("speed", "<i4"), ("headMot", "<i4")]
     + [("headVeh", "<i4"), ("hAcc", "<u4"), ("vAcc", "<u4"), ("sAcc", "<u4"), ("headAcc", "<u4"), ("reserved2", "V4")]
 )
+POSITION = np.dtype(
+    [("iTOW", "<u4"), ("lon", "<i4"), ("lat", "<i4"), ("height", "<i4"), ("hMSL", "<i4"), ("hAcc", "<u4"), ("vAcc", "<u4")]
+)
+VELOCITY = np.dtype(
+    [
+        ("iTOW", "<u4"),
+        ("vel", "<i4", 3),
+        ("speed", "<u4"),
+        ("gSpeed", "<u4"),
+        ("heading", "<i4"),
+        ("sAcc", "<u4"),
+        ("cAcc", "<u4"),
+    ]
+)
+STATUS = np.dtype([("iTOW", "<u4"), ("fTOW", "<i4"), ("week", "<i2"), ("gpsFix", "u1"), ("flags", "u1"), ("rest", "V36")])
+"""NAV-POSLLH, NAV-VELNED and NAV-SOL, which receivers before the eighth generation send in place of NAV-PVT. vel: [cm/s]."""
 ATTITUDE = np.dtype([("iTOW", "<u4"), ("version", "u1"), ("reserved", "V3"), ("angles", "<i4", 3), ("accuracies", "<u4", 3)])
 _DATED = 0b11
 _POSITION_INVALID = 1
+_WEEK_AND_TIME = 0b1100
 _FIX_OK, _DIFFERENTIAL = 1, 2
 _CARRIER = {1: int(FixStatus.FLOAT), 2: int(FixStatus.FIXED)}
 _NO_POSITION = (0, 5)
@@ -147,6 +169,30 @@ def precise_positions(rows: NDArray[np.void], epochs: Epochs) -> dict[str, np.nd
     lla, cov = _precise(rows)
     lla[(rows["flags"] & _POSITION_INVALID) != 0] = np.nan
     return {"t_gps_ns": epochs.dated(rows["iTOW"]), "lla": lla, "cov_pos": cov}
+
+
+def separate_solutions(
+    rows: NDArray[np.void], velocities: NDArray[np.void], states: NDArray[np.void], epochs: Epochs
+) -> dict[str, np.ndarray]:
+    """Columns of NAV-POSLLH (n,), with the velocity of NAV-VELNED and the kind of fix of NAV-SOL of the same epoch."""
+    n = len(rows)
+    vel, cov_vel = np.full((n, 3), np.nan), np.full((n, 3, 3), np.nan)
+    own, other = _same_epoch(rows, velocities)
+    vel[own], cov_vel[own] = other["vel"] * 1e-2, _accuracy(other["sAcc"] * 1e-2, other["sAcc"] * 1e-2)
+    status = np.zeros(n, dtype=np.int8)
+    own, other = _same_epoch(rows, states)
+    kinds = np.zeros(len(other), dtype=[("fixType", "u1"), ("flags", "u1")])
+    kinds["fixType"], kinds["flags"] = other["gpsFix"], other["flags"]
+    status[own] = _statuses(kinds, np.zeros(len(other), dtype=np.int64))
+    columns: dict[str, np.ndarray] = {"t_gps_ns": epochs.dated(rows["iTOW"]), "lla": _geodetic(rows), "vel_n": vel}
+    return columns | {"cov_pos": _accuracy(rows["hAcc"] * 1e-3, rows["vAcc"] * 1e-3), "cov_vel": cov_vel, "status": status}
+
+
+def state_times(rows: NDArray[np.void]) -> Times:
+    """GPS time (n,) of NAV-SOL, 0 where the receiver does not know it yet."""
+    known = ((rows["flags"] & _WEEK_AND_TIME) == _WEEK_AND_TIME) & (rows["week"] > 0) & (rows["iTOW"] < WEEK_S * 1000)
+    t_ns = rows["week"].astype(np.int64) * WEEK_S * 10**9 + rows["iTOW"].astype(np.int64) * 10**6
+    return np.where(known, t_ns, 0)
 
 
 def high_rate(rows: NDArray[np.void], leap: LeapSeconds) -> dict[str, np.ndarray]:

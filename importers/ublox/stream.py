@@ -25,6 +25,7 @@ from navreplay.timeline import LogError, Times
 __all__ = ["UbxLog", "is_ubx"]
 
 _RAWX, _SFRBX, _PVT, _HPPOSLLH, _COV = 0x0215, 0x0213, 0x0107, 0x0114, 0x0136
+_POSLLH, _VELNED, _SOL = 0x0102, 0x0112, 0x0106
 _ATT, _HNR_PVT, _HNR_ATT, _ESF_MEAS, _ESF_RAW = 0x0105, 0x2800, 0x2801, 0x1002, 0x1003
 _SFRBX_HEAD_BYTES, _WORDS = 8, 10
 _NMEA = "NMEA"
@@ -34,6 +35,9 @@ _LENGTHS = {
     _PVT: (84, 8),
     _HPPOSLLH: (36, 0),
     _COV: (64, 0),
+    _POSLLH: (28, 0),
+    _VELNED: (36, 0),
+    _SOL: (52, 0),
     _ATT: (32, 0),
     _HNR_ATT: (32, 0),
     _HNR_PVT: (72, 0),
@@ -45,13 +49,14 @@ _NAMES = {
     _SFRBX: "RXM-SFRBX",
     _PVT: "NAV-PVT",
     _HPPOSLLH: "NAV-HPPOSLLH",
+    _POSLLH: "NAV-POSLLH",
     _ATT: "NAV-ATT",
     _HNR_PVT: "HNR-PVT",
     _HNR_ATT: "HNR-ATT",
     _ESF_RAW: "ESF-RAW",
     _ESF_MEAS: "ESF-MEAS",
 }
-"""Channels; NAV-COV goes into NAV-PVT."""
+"""Channels; NAV-COV goes into NAV-PVT, NAV-VELNED and NAV-SOL into NAV-POSLLH."""
 
 
 def is_ubx(head: bytes) -> bool:
@@ -87,6 +92,7 @@ class UbxLog:
             "RXM-SFRBX": self._words,
             "NAV-PVT": self._solutions,
             "NAV-HPPOSLLH": self._precise_positions,
+            "NAV-POSLLH": self._separate_solutions,
             "NAV-ATT": lambda: self._attitudes(_ATT),
             "HNR-ATT": lambda: self._attitudes(_HNR_ATT),
             "HNR-PVT": self._high_rate,
@@ -144,6 +150,10 @@ class UbxLog:
     def _precise_positions(self) -> Table:
         return _dated(navigation.precise_positions(self._records(_HPPOSLLH), self._epochs()), self._frames[_HPPOSLLH])
 
+    def _separate_solutions(self) -> Table:
+        parts = (self._records(kind) for kind in (_POSLLH, _VELNED, _SOL))
+        return _dated(navigation.separate_solutions(*parts, self._epochs()), self._frames[_POSLLH])
+
     def _high_rate(self) -> Table:
         return _dated(navigation.high_rate(self._records(_HNR_PVT), self._leap), self._frames[_HNR_PVT])
 
@@ -168,10 +178,12 @@ class UbxLog:
         return navigation.Epochs(self._epoch_places()[1])
 
     def _epoch_places(self) -> tuple[np.ndarray, Times]:
-        """Where the epochs of NAV-PVT, or else RXM-RAWX, stand in the stream, and their GPS times."""
+        """Where the epochs of NAV-PVT, else NAV-SOL, else RXM-RAWX stand in the stream, and their GPS times."""
         nothing = np.empty(0, navigation.HIGH_PRECISION), np.empty(0, navigation.COVARIANCE)
         times = navigation.solutions(self._records(_PVT), *nothing, self._leap)["t_gps_ns"]
         places = self._frames[_PVT].start
+        if not times.any():
+            places, times = self._frames[_SOL].start, navigation.state_times(self._records(_SOL))
         if not times.any():
             places, times = self._frames[_RAWX].start, _rawx_times(self._buffer, self._frames[_RAWX])
         return places[times > 0], times[times > 0]
@@ -181,6 +193,9 @@ _LAYOUTS = {
     _PVT: navigation.SOLUTION,
     _HPPOSLLH: navigation.HIGH_PRECISION,
     _COV: navigation.COVARIANCE,
+    _POSLLH: navigation.POSITION,
+    _VELNED: navigation.VELOCITY,
+    _SOL: navigation.STATUS,
     _ATT: navigation.ATTITUDE,
     _HNR_ATT: navigation.ATTITUDE,
     _HNR_PVT: navigation.HIGH_RATE,

@@ -174,3 +174,8 @@ def test_blocks_with_right_checksums_and_any_content_are_borne(tmp_path: Path, n
     except LogError as error:
         said = str(error)
     assert "\n" not in said
+
+
+def test_blocks_behind_a_long_beginning_are_found(tmp_path: Path) -> None:
+    (tmp_path / "a.sbf").write_bytes(b"$R: lstConfigFile, Current\r\n" * 2000 + pvt(0.0))
+    assert open_log(tmp_path / "a.sbf").format == "sbf"

@@ -151,6 +151,16 @@ def test_an_event_may_change_the_types(tmp_path: Path) -> None:
     assert not table.rejected
 
 
+def test_scaled_observations_are_scaled_back(tmp_path: Path) -> None:
+    types = ["C1C", "D1C", "S1C"]
+    scaled = [f"G {100:4d}  {1:2d} D1C".ljust(60) + "SYS / SCALE FACTOR", f"G {10:4d}  {0:2d}".ljust(60) + "SYS / SCALE FACTOR"]
+    for lines, values in ((scaled[:1], [2.1e7, -50_000.0, 45.0]), (scaled[1:], [2.1e8, -5000.0, 450.0])):
+        table = table_of(tmp_path / "log.obs", "\n".join([*header(types), *lines, END, *epoch(8, values)]) + "\n")
+        assert table.columns["pseudorange"].tolist() == [2.1e7]
+        assert table.columns["cn0"].tolist() == [45.0]
+        assert table.columns["range_rate"][0] == pytest.approx(500 * 299_792_458.0 / 1575.42e6)
+
+
 def test_version_2_may_change_its_types_too(tmp_path: Path) -> None:
     lines = ["     2.10           OBSERVATION DATA    G".ljust(60) + "RINEX VERSION / TYPE"]
     lines += ["     2    C1    S1".ljust(60) + "# / TYPES OF OBSERV", END]

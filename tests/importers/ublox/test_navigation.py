@@ -104,6 +104,24 @@ def test_precise_positions_and_covariances_of_the_epoch_take_precedence(tmp_path
     np.testing.assert_allclose(np.sqrt(np.diagonal(table.columns["cov_pos"][1])), [0.02, 0.02, 0.03])
 
 
+def test_receivers_before_nav_pvt_are_read(tmp_path: Path) -> None:
+    def epoch(t: int) -> bytes:
+        tow = {"iTOW": START_TOW_MS + 1000 * t}
+        place = {"lat": 48.2, "lon": 11.6, "height": 545_123, "hAcc": 900, "vAcc": 1500}
+        state = {"week": 2288, "gpsFix": 3, "gpsfixOK": 1, "wknSet": 1, "towSet": 1, "diffSoln": t}
+        messages = [UBXMessage("NAV", "NAV-POSLLH", GET, **tow, **place), UBXMessage("NAV", "NAV-SOL", GET, **tow, **state)]
+        messages.append(UBXMessage("NAV", "NAV-VELNED", GET, **tow, velN=300, velE=400, velD=-50, sAcc=20))
+        return b"".join(message.serialize() for message in messages)
+
+    columns = read(tmp_path / "a.ubx", epoch(0) + epoch(1), "NAV-POSLLH").columns
+    assert columns["t_gps_ns"].tolist() == [START_NS, START_NS + 10**9]
+    np.testing.assert_allclose(columns["vel_n"], [[3.0, 4.0, -0.5]] * 2)
+    np.testing.assert_allclose(np.sqrt(np.diagonal(columns["cov_pos"][0])), [0.9, 0.9, 1.5])
+    np.testing.assert_allclose(np.sqrt(np.diagonal(columns["cov_vel"][0])), 0.2)
+    assert columns["lla"][0, 2] == pytest.approx(545.123)
+    assert columns["status"].tolist() == [FixStatus.SINGLE, FixStatus.DIFFERENTIAL]
+
+
 def esf(ticks: np.ndarray, gyro_dps: np.ndarray, accel: np.ndarray, raw: bool) -> list[bytes]:
     """Messages of the inertial sensor as they stand in the stream, hand-packed: three gyro and three accelerometer data."""
     messages = []
