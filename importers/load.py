@@ -15,11 +15,11 @@ from importers.conversion.reference import convert_reference, reference_from_fix
 from importers.formats import open_log
 from importers.roles.mapped_log import unused_mappings
 from importers.roles.selection import Choice, choose_channels, named_channel
-from importers.roles.sources import Clock, Source, join_sources
+from importers.roles.sources import Clock, Joined, Source, join_sources
 from importers.rows.clock import leap_seconds
 from importers.rows.log import Log, Table, local_path
 from importers.settings import InputSettings
-from navreplay.timeline import ChannelUse, LogError, Provenance, RangeSeries, SourceFile, Timeline
+from navreplay.timeline import ChannelUse, LogError, Provenance, RangeSeries, SourceFile, Timeline, Trajectory
 
 __all__ = ["build_timeline", "describe_file", "load_timeline", "open_logs"]
 
@@ -78,7 +78,7 @@ def build_timeline(
         imu, told, assumed, found = convert_imu(joined, settings.imu)
         uses, notes, recognised = [*uses, *told], [*notes, *assumed], recognised | found
     if "fix" in sources or "velocity" in sources:
-        position, velocity = (join_sources(sources[role], settings.fix, clock) if role in sources else None for role in _GNSS)
+        position, velocity = _positions_and_velocities(sources, settings, clock, unreadable)
         fixes, told, assumed, found = convert_fixes(position, velocity, settings.fix)
         uses, notes, recognised = [*uses, *told], [*notes, *assumed], recognised | found
     if "range" in sources:
@@ -90,8 +90,7 @@ def build_timeline(
         )
         uses, notes = [*uses, *told], [*notes, *assumed]
     if "reference" in sources:
-        joined = join_sources(sources["reference"], settings.reference, clock)
-        trajectory, told, assumed = convert_reference(joined, settings.reference)
+        trajectory, told, assumed = _reference(sources["reference"], settings, clock, unreadable)
         uses, notes = [*uses, *told], [*notes, *assumed]
     elif settings.reference.from_fixes and fixes is not None:
         trajectory = reference_from_fixes(fixes, settings.reference)
@@ -112,7 +111,35 @@ def build_timeline(
     )
 
 
-_GNSS = ("fix", "velocity")
+def _positions_and_velocities(
+    sources: Mapping[str, list[Source]], settings: InputSettings, clock: Clock, told: list[str]
+) -> tuple[Joined | None, Joined | None]:
+    """Both channels of a receiver; velocities that no setting names and that cannot be read cost the positions nothing."""
+    position = join_sources(sources["fix"], settings.fix, clock) if "fix" in sources else None
+    try:
+        velocity = join_sources(sources["velocity"], settings.fix, clock) if "velocity" in sources else None
+    except LogError as error:
+        if position is None or settings.fix.velocity_channel is not None:
+            raise
+        told.append(f"{error}; so its velocities are not used")
+        velocity = None
+    return position, velocity
+
+
+def _reference(
+    sources: list[Source], settings: InputSettings, clock: Clock, told: list[str]
+) -> tuple[Trajectory | None, tuple[ChannelUse, ...], tuple[str, ...]]:
+    """The reference, its accounting, and what was assumed; none where a driver's own solution, which nobody asked for, is of no
+    use."""
+    try:
+        return convert_reference(join_sources(sources, settings.reference, clock), settings.reference)
+    except LogError as error:
+        if settings.reference.channel is not None or any(source.channel.rank == 0 for source in sources):
+            raise
+        told.append(f"{error}; so there is no reference")
+        return None, (), ()
+
+
 _INDISPENSABLE = ("imu", "fix")
 
 

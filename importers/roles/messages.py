@@ -39,6 +39,8 @@ _GPS_STATUS = {
 _STDS_OF_95_PERCENT = 2.0
 _CLIMB_STD = 100.0
 _LATEST_NS = 9.2e18
+_EARLIEST_UNIX_NS = 631_152_000 * 10**9
+_NS_OF_UNITS = (10**3, 10**6, 10**9)
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,13 +67,34 @@ def kind_of(channel: Channel) -> Kind | None:
 
 
 def stamp_column(table: Table) -> np.ndarray | None:
-    """Stamps in nanoseconds since 1970 within the messages, None where the type has none."""
+    """Stamps in nanoseconds since 1970 within the messages, None where the type has none.
+
+    A stamp that is a number in JSON may count seconds, milliseconds or microseconds: that is taken with which it is a date, and
+    spans the time that the recorder does.
+    """
     columns = (table.columns.get(name) for name in ("header.stamp", "timestamp", "stamp"))
     column = next((column for column in columns if column is not None), None)
-    if column is None or column.dtype.kind in "iu":
+    if column is None or len(column) == 0:
         return column
-    stamps = numbers_of(column)
-    return np.where(np.abs(stamps) < _LATEST_NS, np.nan_to_num(stamps), 0.0).astype(np.int64)
+    counts = column if column.dtype.kind in "iu" else numbers_of(column)
+    scale = _stamp_scale(counts.astype(np.float64), table.log_time_ns)
+    if scale == 1 and counts.dtype.kind in "iu":
+        return counts
+    stamps = counts * float(scale) if counts.dtype.kind == "f" else counts.astype(np.float64) * scale
+    return np.where(np.abs(stamps) < _LATEST_NS, np.nan_to_num(np.rint(stamps)), 0.0).astype(np.int64)
+
+
+def _stamp_scale(counts: Floats, log_time_ns: np.ndarray) -> int:
+    """Nanoseconds per count."""
+    known = counts[np.isfinite(counts)]
+    if len(known) < 2 or np.median(known) >= _EARLIEST_UNIX_NS:
+        return 1
+    span, recorded = float(np.ptp(known)), float(np.ptp(log_time_ns))
+    for scale in _NS_OF_UNITS:
+        dated = _EARLIEST_UNIX_NS <= np.median(known) * scale < _LATEST_NS
+        if dated and 0.5 * recorded <= span * scale <= 2 * recorded:
+            return scale
+    return 1
 
 
 def _count(columns: Mapping[str, np.ndarray]) -> int:

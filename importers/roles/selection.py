@@ -22,9 +22,10 @@ SETTING = {
 }
 """The setting that names the channel of a role."""
 _RATES_AND_FORCES = (
-    ("gyroscope", "accelerometer"),
-    ("gyro", "accel"),
-    ("angular_velocity", "linear_acceleration"),
+    ("gyroscope", ("accelerometer",)),
+    ("gyro", ("accel", "acc", "accelerometer", "acceleration")),
+    ("angular_velocity", ("linear_acceleration", "acceleration")),
+    ("ang_vel", ("lin_acc", "acc")),
 )
 NOTHING = "none"
 """In place of a channel's name: no channel is to serve."""
@@ -110,23 +111,20 @@ def _accelerations(logs: Sequence[Log], name: str | None, imu: str | None) -> li
         return [replace(choice, role="accel") for choice in _named(logs, "imu", name, "accel")]
     sensors = candidates(logs, "imu")
     names = {choice.channel.name for choice in sensors} if imu is None else {imu}
-    beside = {_beside_rates(other) for other in names}
+    beside = {forces for other in names for forces in _beside_rates(other)}
     return [replace(choice, role="accel") for choice in sensors if choice.channel.name in beside]
 
 
 def _without_accelerations(found: list[Choice]) -> list[Choice]:
     """The channels, without those of accelerations that stand beside one of rates."""
     names = {choice.channel.name for choice in found}
-    beside = {_beside_rates(name) for name in names}
+    beside = {forces for name in names for forces in _beside_rates(name)}
     return [choice for choice in found if choice.channel.name not in beside]
 
 
-def _beside_rates(name: str) -> str | None:
-    """The name that a channel of accelerations would have beside one of angular rates; None for another name."""
-    for rates, forces in _RATES_AND_FORCES:
-        if rates in name:
-            return name.replace(rates, forces)
-    return None
+def _beside_rates(name: str) -> list[str]:
+    """The names that a channel of accelerations would have beside one of angular rates."""
+    return [name.replace(rates, other) for rates, forces in _RATES_AND_FORCES if rates in name for other in forces]
 
 
 def _automatic(channel: Channel, role: str) -> bool:

@@ -19,3 +19,4 @@ def run(arguments: argparse.Namespace) -> None:
     for known in known_here:
         extensions = f" ({', '.join(known.extensions)})" if known.extensions else ""
         print(f"{known.name:<{width}}  {known.description}{extensions}")
+    print("any of them packed by gzip, bzip2, xz, zstd or zip, or at an address (s3://, https://) with navreplay[remote]")

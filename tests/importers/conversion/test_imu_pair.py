@@ -37,6 +37,7 @@ def load(folder: Path, tables: dict[str, Table], **imu: Any) -> Timeline:
     [
         (("/camera/gyro/sample", "/camera/accel/sample"), {}),
         (("/gyroscope", "/accelerometer"), {}),
+        (("/imu/gyro", "/imu/acc"), {}),
         (("/imu/angular_velocity", "/imu/linear_acceleration"), {}),
         (("/camera/gyro/sample", "/camera/accel/sample"), {"channel": "/camera/gyro/sample"}),
         (("/a", "/b"), {"channel": "/a", "accel_channel": "/b"}),

@@ -78,6 +78,24 @@ def test_a_channel_that_is_needed_is_told_with_its_reason(tmp_path: Path, fault:
         load_timeline([path], InputSettings.model_validate({"fix": {"channel": "/bad"}}))
 
 
+def test_velocities_of_another_definition_cost_the_positions_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "log.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        write_healthy(writer)
+        schema = writer.register_schema("geometry_msgs/msg/TwistStamped", "ros2msg", b"float64 speed\n")
+        channel = writer.register_channel("/vel", "cdr", schema)
+        for i in range(N):
+            writer.add_message(channel, START_NS + i, b"\0\1\0\0" + bytes(8), START_NS + i)
+        writer.finish()
+    timeline = load_timeline([path])
+    assert timeline.fixes is not None
+    assert any("has no field twist.linear; so its velocities are not used" in note for note in timeline.provenance.damage)
+    with pytest.raises(LogError, match=r"has no field twist\.linear"):
+        load_timeline([path], InputSettings.model_validate({"fix": {"velocity_channel": "/vel"}}))
+
+
 def test_bag_with_a_type_that_nobody_defines(tmp_path: Path) -> None:
     with Writer2(tmp_path / "bag", version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
         connection = writer.add_connection("/imu", IMU, typestore=ROS2)

@@ -296,6 +296,21 @@ def test_one_topic_with_two_types(tmp_path: Path, second: str) -> None:
         assert np.allclose(np.degrees(timeline.fixes.lla[:, 0]), LAT)
 
 
+def test_a_solution_that_never_aligned_is_no_reference(tmp_path: Path) -> None:
+    ins, gnss = "novatel_oem7_msgs/msg/INSPVAX", "novatel_oem7_msgs/msg/BESTPOS"
+    messages = []
+    for i in range(N):
+        t_ns = START_NS + i * 10**8
+        messages += [("/ins", ins, t_ns, {"ins_status.status": 1}), ("/pos", gnss, t_ns, DRIVERS[gnss])]
+    bag = write_humble(tmp_path / "bag", messages)
+    timeline = load_timeline([bag])
+    assert timeline.fixes is not None
+    assert timeline.reference is None
+    assert any("so there is no reference" in note for note in timeline.provenance.damage)
+    with pytest.raises(LogError, match="none of its 30 rows can serve as reference"):
+        load_timeline([bag], InputSettings.model_validate({"reference": {"channel": "/ins"}}))
+
+
 def test_a_mapping_of_the_configuration_goes_first(tmp_path: Path) -> None:
     kind = "px4_msgs/msg/SensorGps"
     values = {"latitude_deg": LAT, "longitude_deg": LON, "altitude_msl_m": 7.0, "altitude_ellipsoid_m": HEIGHT}

@@ -9,7 +9,8 @@ import pytest
 from importers.decoding.json_text import JsonDecoder
 from importers.roles.heights import fill_unknown_heights
 from importers.roles.message_fields import either_spelling, find_field
-from importers.roles.messages import find_kind
+from importers.roles.messages import find_kind, stamp_column
+from importers.rows.log import Table
 from importers.rows.tables import NO_FIX, Rows
 from navreplay.timeline import FixStatus
 
@@ -59,6 +60,23 @@ def test_fix_without_a_covariance_keeps_its_position(covariance: np.ndarray | No
 )
 def test_stamps_of_json_in_every_spelling(stamp: Any, expected: int) -> None:
     assert decoded([{"timestamp": stamp}] * 2)["timestamp"].tolist() == [expected] * 2
+
+
+@pytest.mark.parametrize("per_second", [1, 1e3, 1e6, 1e9])
+@pytest.mark.parametrize("whole", [False, True])
+def test_stamps_that_are_plain_numbers(per_second: float, whole: bool) -> None:
+    seconds = [1_700_000_000 + 2 * i for i in range(9)]
+    stamps = [int(s * per_second) if whole else s * per_second for s in seconds]
+    table = Table(np.array(seconds) * 10**9 + 5000, decoded([{"timestamp": stamp} for stamp in stamps]), 9)
+    found = stamp_column(table)
+    assert found is not None
+    assert np.abs(found - np.array(seconds) * 10**9).max() < 1000
+
+
+def test_stamps_from_power_on_are_no_seconds_of_a_calendar() -> None:
+    boot = np.arange(2000) * 10**7 + 10**9  # passes 1.7e9 after 0.7 s
+    table = Table(T_NS + np.arange(2000) * 10**7, {"header.stamp": boot}, 2000)
+    assert np.array_equal(stamp_column(table), boot)
 
 
 def test_protobufs_own_json_form() -> None:
