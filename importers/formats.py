@@ -8,11 +8,11 @@ from importers.containers.file_bytes import is_bag_folder
 from importers.containers.packed import packing_of, unpack_file
 from importers.containers.remote import fetch, is_address
 from importers.containers.stand_in import Scratch, StandIn, told_as
+from importers.meanings.mapped_log import MappedLog
 from importers.rinex.navigation import is_rinex_navigation, read_rinex_navigation
 from importers.rinex.observation import is_rinex_observation, read_rinex_observation
 from importers.rinex.sp3 import is_sp3, read_sp3
 from importers.rinex.text import other_kind
-from importers.roles.mapped_log import MappedLog
 from importers.rows.clock import leap_seconds
 from importers.rows.log import Log
 from importers.settings import InputSettings

@@ -10,8 +10,8 @@ from importers.conversion.ranges import flat_source
 from importers.findings import Finding
 from importers.formats import open_log
 from importers.load import build_timeline, describe_file, open_logs
+from importers.meanings.draft import draft_local, draft_mapping
 from importers.preflight.checks import preflight
-from importers.roles.draft import draft_local, draft_mapping
 from importers.roles.messages import kind_of, stamp_column
 from importers.roles.selection import SETTING, Choice, always_used, candidates, choose_role
 from importers.roles.sources import Clock, Source, join_sources

@@ -13,7 +13,7 @@ from importers.conversion.imu_pair import join_accelerations
 from importers.conversion.ranges import convert_ranges
 from importers.conversion.reference import convert_reference, reference_from_fixes
 from importers.formats import open_log
-from importers.roles.mapped_log import unused_mappings
+from importers.meanings.mapped_log import unused_mappings
 from importers.roles.selection import Choice, choose_channels, named_channel
 from importers.roles.sources import Clock, Joined, Source, join_sources
 from importers.rows.clock import leap_seconds

@@ -4,40 +4,24 @@ Types are named without the ``/msg/`` of ROS 2. ROS conventions are those of REP
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
 from importers.roles.ephemeris_messages import EPHEMERIS_TYPES
-from importers.roles.message_fields import codes, covariances, numbers, numbers_of, vectors
+from importers.roles.fix_messages import gps_fix, nav_sat_fix
 from importers.roles.range_messages import RANGE_TYPES
 from importers.roles.receiver_types import RECEIVER_TYPES
 from importers.rows.log import Channel, Table
-from importers.rows.tables import NO_FIX, Rows, diagonal_covariance
+from importers.rows.message_fields import covariances, numbers_of, vectors
+from importers.rows.tables import Rows
 from importers.text.nmea import NMEA_NOTE
 from navreplay.geodesy.rotation import scalar_first_from_last
-from navreplay.options import FilterOptions
-from navreplay.timeline import FixStatus, Floats, LogError
+from navreplay.timeline import Floats, LogError
 
 __all__ = ["KINDS", "Kind", "find_kind", "kind_of", "stamp_column"]
 
-_EAST_NORTH = [1, 0, 2]
-_UP_SIGNS = np.outer([1.0, 1.0, -1.0], [1.0, 1.0, -1.0])
-_RTK_FIXED_STD = 0.1
-_RTK_FLOAT_STD = 1.0
-_APPROXIMATE = (1, 2)
-"""Covariance types of which only the diagonal is meant."""
-_STATUS_UNKNOWN = -2
-_COVARIANCE_KNOWN = 3
-_COVARIANCE_TYPES = {"UNKNOWN": 0, "APPROXIMATED": 1, "DIAGONAL_KNOWN": 2, "KNOWN": 3}
-_GPS_STATUS = {
-    -1: NO_FIX, 0: FixStatus.SINGLE, 1: FixStatus.DIFFERENTIAL, 18: FixStatus.DIFFERENTIAL, 19: FixStatus.FIXED,
-    20: FixStatus.FLOAT, 33: FixStatus.DIFFERENTIAL,
-}  # fmt: skip
-"""Of gps_msgs/GPSStatus; 2 (ground-based augmentation) is judged by the accuracy told."""
-_STDS_OF_95_PERCENT = 2.0
-_CLIMB_STD = 100.0
 _LATEST_NS = 9.2e18
 _EARLIEST_UNIX_NS = 631_152_000 * 10**9
 _NS_OF_UNITS = (10**3, 10**6, 10**9)
@@ -135,75 +119,6 @@ def _own_imu(columns: Mapping[str, np.ndarray]) -> Rows:
     return Rows(gyro=vectors(columns, "angular_velocity", 3, n), accel=vectors(columns, "linear_acceleration", 3, n))
 
 
-def _nav_sat_fix(columns: Mapping[str, np.ndarray]) -> Rows:
-    cov = _position_covariance(columns)
-    status = np.zeros(len(cov), dtype=np.int8)
-    if "status.status" in columns:
-        status = _satellite_status(codes(columns, "status.status", len(cov), _STATUS_UNKNOWN), cov)
-    return Rows(lla=_geodetic(columns), cov_pos=cov, status=status)
-
-
-def _gps_fix(columns: Mapping[str, np.ndarray]) -> Rows:
-    rows = _nav_sat_fix(columns)
-    n = _count(columns)
-    if "status.status" in columns:
-        code = codes(columns, "status.status", n, _STATUS_UNKNOWN)
-        meant = np.array([_GPS_STATUS.get(value, FixStatus.UNKNOWN) for value in code.tolist()], dtype=np.int8)
-        rows = replace(rows, status=np.where(code == 2, rows.status, meant))
-    vel, cov_vel = _track_velocity(columns, n)
-    return replace(rows, vel=vel, cov_vel=cov_vel)
-
-
-def _track_velocity(columns: Mapping[str, np.ndarray], n: int) -> tuple[Floats, Floats | None]:
-    """Velocities NED (n, 3) of speed, track [deg] and climb, and their covariances (None: unknown). What a driver never fills
-    stays 0 throughout, without an error told: such a speed is unknown, such a climb too uncertain to count."""
-    speed, climb = numbers(columns, "speed", n), numbers(columns, "climb", n)
-    track = np.where(speed == 0, np.nan_to_num(numbers(columns, "track", n)), numbers(columns, "track", n))
-    if not np.any(np.nan_to_num(speed)) and not np.any(np.nan_to_num(track)) and not _told(columns, "err_speed", n):
-        return np.full((n, 3), np.nan), None
-    no_climb = ~np.isfinite(climb)
-    if not np.any(np.nan_to_num(climb)) and not _told(columns, "err_climb", n):
-        no_climb[:] = True
-    course = np.radians(track)
-    vel = np.column_stack([speed * np.cos(course), speed * np.sin(course), -np.where(no_climb, 0.0, climb)])
-    if not no_climb.any():
-        return vel, None
-    std = numbers(columns, "err_speed", n) / _STDS_OF_95_PERCENT
-    std = np.where(std > 0, std, FilterOptions().default_velocity_std[0])
-    return vel, diagonal_covariance(np.column_stack([std, std, np.where(no_climb, _CLIMB_STD, std)]))
-
-
-def _told(columns: Mapping[str, np.ndarray], name: str, n: int) -> bool:
-    return bool(np.any(np.nan_to_num(numbers(columns, name, n)) > 0))
-
-
-def _geodetic(columns: Mapping[str, np.ndarray]) -> Floats:
-    n = len(columns["latitude"])
-    lla = np.column_stack([numbers_of(columns["latitude"]), numbers_of(columns["longitude"]), numbers(columns, "altitude", n)])
-    return np.asarray(lla * [np.pi / 180, np.pi / 180, 1.0])
-
-
-def _position_covariance(columns: Mapping[str, np.ndarray]) -> Floats:
-    """NED covariances (n, 3, 3) of ENU ones, all NaN where their type says unknown or there is none."""
-    n = len(columns["latitude"])
-    cov = covariances(columns, "position_covariance", 3, n)
-    kind = codes(columns, "position_covariance_type", n, _COVARIANCE_KNOWN, _COVARIANCE_TYPES)
-    diagonal = np.isin(kind, _APPROXIMATE)
-    cov = np.where(diagonal[:, None, None] & ~np.eye(3, dtype=bool), 0.0, cov)
-    cov = cov[:, _EAST_NORTH][:, :, _EAST_NORTH] * _UP_SIGNS + 0.0  # by place: an unknown element stays alone; no -0
-    cov[kind == 0] = np.nan
-    return np.asarray(cov)
-
-
-def _satellite_status(code: np.ndarray, cov: Floats) -> np.ndarray:
-    """FixStatus of NavSatStatus. A ground-based augmentation (2) is how drivers tell carrier-phase solutions; the standard
-    deviation separates fixed from float from code-differential. -2 is unknown (since ROS 2 Jazzy), as is any other code."""
-    std = np.sqrt(np.maximum(cov[:, 0, 0], cov[:, 1, 1]), where=cov[:, 0, 0] >= 0, out=np.full(len(cov), np.inf))
-    ground = np.where(std <= _RTK_FIXED_STD, FixStatus.FIXED, np.where(std <= _RTK_FLOAT_STD, FixStatus.FLOAT, 2))
-    known = [code == -1, code == 0, code == 1, code == 2]
-    return np.select(known, [NO_FIX, FixStatus.SINGLE, FixStatus.DIFFERENTIAL, ground], FixStatus.UNKNOWN).astype(np.int8)
-
-
 def _twist(prefix: str) -> Callable[[Mapping[str, np.ndarray]], Rows]:
     def rows(columns: Mapping[str, np.ndarray]) -> Rows:
         """Velocities and, where the message has them, their covariances."""
@@ -283,12 +198,12 @@ _MSL_NOTE = "heights of the fixes are taken as ellipsoidal, as NavSatFix defines
 
 KINDS: dict[str, Kind] = {
     "sensor_msgs/Imu": Kind(("imu", "attitude"), _imu),
-    "sensor_msgs/NavSatFix": Kind(_FIX, _nav_sat_fix, _MSL_NOTE),
+    "sensor_msgs/NavSatFix": Kind(_FIX, nav_sat_fix, _MSL_NOTE),
     "sensor_msgs/TimeReference": Kind(("time",), _no_rows),
-    "gps_common/GPSFix": Kind(_FIX, _gps_fix),
-    "gps_msgs/GPSFix": Kind(_FIX, _gps_fix),
-    "foxglove.LocationFix": Kind(_FIX, _nav_sat_fix, _MSL_NOTE),
-    "foxglove_msgs/LocationFix": Kind(_FIX, _nav_sat_fix, _MSL_NOTE),
+    "gps_common/GPSFix": Kind(_FIX, gps_fix),
+    "gps_msgs/GPSFix": Kind(_FIX, gps_fix),
+    "foxglove.LocationFix": Kind(_FIX, nav_sat_fix, _MSL_NOTE),
+    "foxglove_msgs/LocationFix": Kind(_FIX, nav_sat_fix, _MSL_NOTE),
     "geometry_msgs/TwistStamped": Kind(("velocity",), _twist("twist.")),
     "geometry_msgs/TwistWithCovarianceStamped": Kind(("velocity",), _twist("twist.twist.")),
     "geometry_msgs/QuaternionStamped": Kind(("attitude",), _quaternion, automatic=False),

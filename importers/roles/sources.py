@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from importers.roles.heights import fill_unknown_heights
-from importers.roles.message_fields import either_spelling
 from importers.roles.messages import kind_of, stamp_column
 from importers.rows.clock import gps_from_stamps
 from importers.rows.log import Channel, Table
+from importers.rows.message_fields import either_spelling
 from importers.rows.screening import Screening
 from importers.rows.tables import Rows
 from importers.settings import AttitudeInput, FixInput, ImuInput, ReferenceInput

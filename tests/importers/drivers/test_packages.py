@@ -7,8 +7,8 @@ import pytest
 import importers.drivers
 from importers.decoding.ros_definitions import RosType, find_type
 from importers.drivers.packages import definitions_of, meanings_of
+from importers.meanings.mapped_log import CONVERTED
 from importers.message_settings import MessageMapping
-from importers.roles.mapped_log import CONVERTED
 from importers.roles.messages import find_kind
 
 PACKAGES = sorted(path.stem for path in Path(importers.drivers.__file__).parent.glob("*.toml"))

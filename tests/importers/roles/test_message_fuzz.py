@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from importers.decoding.json_text import JsonDecoder
-from importers.roles.draft import draft_mapping
+from importers.meanings.draft import draft_mapping
 from importers.rows.log import Channel, Table
 from navreplay.timeline import LogError
 from tests.helpers.log_samples import START_NS

@@ -8,9 +8,9 @@ import pytest
 
 from importers.decoding.json_text import JsonDecoder
 from importers.roles.heights import fill_unknown_heights
-from importers.roles.message_fields import either_spelling, find_field
 from importers.roles.messages import find_kind, stamp_column
 from importers.rows.log import Table
+from importers.rows.message_fields import either_spelling, find_field
 from importers.rows.tables import NO_FIX, Rows
 from navreplay.timeline import FixStatus
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from importers.roles.message_fields import either_spelling
 from importers.rows.log import Table
+from importers.rows.message_fields import either_spelling
 from importers.ublox.sensors import samples_of_data, signed_field, unwrapped_ticks
 from navreplay.geodesy.time_scales import LeapSeconds, gps_from_utc
 from navreplay.timeline import LogError

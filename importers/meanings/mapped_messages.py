@@ -7,10 +7,10 @@ import numpy as np
 
 from importers.message_settings import MessageMapping, MessageTime
 from importers.quantities import unit_factor
-from importers.roles.message_fields import find_field, numbers_of
 from importers.rows.axes import axes_matrix
 from importers.rows.clock import count_ns, gps_from_gps_unix, gps_from_stamps, is_time
 from importers.rows.log import Table
+from importers.rows.message_fields import find_field, numbers_of
 from importers.rows.tables import NO_FIX, diagonal_covariance, drop_absurd, status_codes
 from navreplay.geodesy.earth import ecef_from_lla, lla_from_ecef, matrix_en
 from navreplay.geodesy.rotation import quat_from_euler

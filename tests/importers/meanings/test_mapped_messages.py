@@ -13,8 +13,8 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from importers.drivers.packages import definitions_of
 from importers.formats import open_log
 from importers.load import load_timeline
+from importers.meanings.mapped_messages import map_table
 from importers.message_settings import MessageMapping
-from importers.roles.mapped_messages import map_table
 from importers.rows.log import Table
 from importers.settings import InputSettings
 from navreplay.geodesy.time_scales import LEAP_SECONDS, gps_from_utc

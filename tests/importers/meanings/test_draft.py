@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mcap.writer import Writer
 
-from importers.roles.draft import draft_mapping
+from importers.meanings.draft import draft_mapping
 from importers.rows.log import Channel, Table
 from pipelines.cli import main
 from pipelines.config.spec import load_config

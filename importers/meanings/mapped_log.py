@@ -7,10 +7,10 @@ import numpy as np
 
 from importers.decoding.channel_reading import require_channels
 from importers.drivers.packages import meanings_of
+from importers.meanings.esf_messages import ESF_NOTE, esf_samples
+from importers.meanings.mapped_messages import fits_fields, map_table
+from importers.meanings.nmea_messages import sentence_fixes
 from importers.message_settings import MessageMapping, MessageTime
-from importers.roles.esf_messages import ESF_NOTE, esf_samples
-from importers.roles.mapped_messages import fits_fields, map_table
-from importers.roles.nmea_messages import sentence_fixes
 from importers.rows.log import Channel, Log, Table
 from navreplay.geodesy.time_scales import LeapSeconds
 from navreplay.timeline import LogError

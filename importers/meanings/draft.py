@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from importers.meanings.mapped_messages import map_table
 from importers.message_settings import MessageMapping
-from importers.roles.mapped_messages import map_table
 from importers.rows.log import Channel, Table
 from navreplay.geodesy.time_scales import LEAP_SECONDS
 from navreplay.timeline import Floats, LogError
