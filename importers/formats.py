@@ -6,7 +6,7 @@ from pathlib import Path
 
 from importers.containers.file_bytes import is_bag_folder
 from importers.containers.packed import packing_of, unpack_file
-from importers.containers.remote import fetch, is_address
+from importers.containers.remote import address_of, fetch
 from importers.containers.stand_in import Scratch, StandIn, told_as
 from importers.meanings.mapped_log import MappedLog
 from importers.rinex.navigation import is_rinex_navigation, read_rinex_navigation
@@ -71,10 +71,11 @@ def open_log(path: str | Path, settings: InputSettings | None = None) -> Log:
     name = str(path)
     if name == "-":
         raise LogError("-: a log is read more than once, so it cannot come from standard input; save it to a file first")
-    if is_address(name):
+    address = address_of(name)
+    if address is not None:
         owner = Scratch()
-        place = fetch(name, owner)
-        return _stand_in(name, place, owner, str(place), "", settings)
+        place = fetch(address, owner)
+        return _stand_in(address, place, owner, str(place), "", settings)
     head = b"" if Path(name).is_dir() else _read_head(name)
     packing = packing_of(head)
     if packing:

@@ -6,14 +6,19 @@ from pathlib import Path
 from importers.containers.file_bytes import scratch_file
 from navreplay.timeline import LogError
 
-__all__ = ["fetch", "is_address"]
+__all__ = ["address_of", "fetch"]
 
-_ADDRESS = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+(::[A-Za-z][A-Za-z0-9+.-]+)*://.+")
+_ADDRESS = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+(?:::[A-Za-z][A-Za-z0-9+.-]+)*):/{1,3}(.+)")
 
 
-def is_address(path: str) -> bool:
-    """Whether a path is an address rather than a file here."""
-    return _ADDRESS.fullmatch(path) is not None
+def address_of(path: str) -> str | None:
+    """The address that a path is, rather than a file here; None where it is none. One of the two slashes may be missing, as
+    where it went through a file's path."""
+    parts = _ADDRESS.fullmatch(path)
+    if parts is None or Path(path).exists():
+        return None
+    scheme, rest = parts.groups()
+    return path if "://" in path else f"{scheme}://{'/' if scheme == 'file' else ''}{rest}"
 
 
 def fetch(address: str, owner: object) -> Path:

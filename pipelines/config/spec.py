@@ -15,6 +15,7 @@ import tomlkit
 from pydantic import BaseModel, Field, ValidationError
 from pydantic_core import ErrorDetails
 
+from importers.containers.remote import address_of
 from importers.settings import InputSettings
 from navreplay.options import FilterOptions
 from navreplay.timeline import LogError
@@ -146,12 +147,12 @@ def _parse_value(text: str) -> object:
 
 
 def _resolve_paths(data: dict[str, Any], folder: Path) -> None:
-    """Makes the paths in the parsed TOML absolute, in place."""
+    """Makes the paths in the parsed TOML absolute, in place; addresses stay."""
     for *sections, name in _PATH_KEYS:
         table: Any = data
         for section in sections:
             table = table.get(section, {}) if isinstance(table, dict) else {}
-        if isinstance(table, dict) and isinstance(table.get(name), str):
+        if isinstance(table, dict) and isinstance(table.get(name), str) and address_of(table[name]) is None:
             table[name] = str((folder / table[name]).resolve())
 
 

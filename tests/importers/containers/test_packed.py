@@ -14,10 +14,12 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 
 import importers.containers.packed as packed
+from importers.containers.remote import address_of
 from importers.formats import open_log
 from importers.load import load_timeline
 from importers.settings import CsvMapping, CsvTime, InputSettings
 from navreplay.timeline import LogError
+from pipelines.config.spec import load_config
 from tests.helpers.log_samples import IMU, ROS2, assert_imus, raw_imus, write_mcap, write_ros1_bag
 
 COUNT = 60
@@ -163,6 +165,31 @@ def test_an_address_is_fetched(tmp_path: Path, suffix: str) -> None:
     assert log.path == address
     assert_imus(log.read(("/imu",))["/imu"], COUNT)
     assert [file.path for file in load_timeline([address]).provenance.files] == [address]
+
+
+def test_a_reference_at_an_address(tmp_path: Path) -> None:
+    pytest.importorskip("fsspec")
+    path = tmp_path / "truth.csv"
+    rows = "".join(f"{1_384_035_218_000_000_000 + i * 10**8},48,11,500,1,0,0,0\n" for i in range(9))
+    path.write_text("t_gps_ns,lat_deg,lon_deg,height_m,q_nb_w,q_nb_x,q_nb_y,q_nb_z\n" + rows)
+    log = write_mcap(tmp_path / "log.mcap", raw_imus(ROS2, COUNT))
+    config = load_config(None, [f"input.reference.file=file://{path}"])
+    timeline = load_timeline([log], config.input)
+    assert timeline.reference is not None
+    assert len(timeline.reference) == 9
+
+
+@pytest.mark.parametrize(
+    ("path", "address"),
+    [
+        ("s3://b/k.mcap", "s3://b/k.mcap"), ("s3:/b/k.mcap", "s3://b/k.mcap"), ("file:/a/b", "file:///a/b"),
+        ("C:/a.mcap", None),
+        ("simplecache::s3://b/k", "simplecache::s3://b/k"), ("/data/a:b.mcap", None), ("a.mcap", None),
+        ("https://h/x?a=b", "https://h/x?a=b"),
+    ],
+)  # fmt: skip
+def test_addresses_are_told_from_files(path: str, address: str | None) -> None:
+    assert address_of(path) == address
 
 
 def test_a_bag_folder_at_an_address(tmp_path: Path) -> None:
