@@ -116,7 +116,7 @@ def glonass_record(library: "pyrtklib", state: Any) -> NDArray[np.void]:
     record["sat"], record["toe_ns"] = name, _ns(eph.toe)
     for axis in range(3):
         record["pos"][axis], record["vel"][axis], record["acc"][axis] = eph.pos[axis], eph.vel[axis], eph.acc[axis]
-    record["tau"], record["gamma"], record["channel"], record["health"] = -eph.taun, eph.gamn, eph.frq, eph.svh
+    record["tau"], record["gamma"], record["channel"], record["health"] = eph.taun, eph.gamn, eph.frq, eph.svh
     return record
 
 

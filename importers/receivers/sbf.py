@@ -15,6 +15,7 @@ from importers.decoding.blocks import Buffer, Offsets
 from importers.decoding.byte_rows import records
 from importers.decoding.channel_log import ChannelLog
 from importers.receivers.frame_scan import CRC16_CCITT, scan_sbf
+from importers.receivers.sbf_ephemerides import EPHEMERIS_BLOCKS, ephemerides
 from importers.receivers.sbf_fixes import POSITION_COVARIANCE, SOLUTION, VELOCITY_COVARIANCE, solutions
 from importers.receivers.sbf_imu import sensor_samples
 from importers.receivers.sbf_ins import inertial_solution
@@ -67,8 +68,20 @@ def open_sbf(path: str) -> ChannelLog:
         if count:
             reader = _reader(path, name, buffer, blocks, makers[number], () if number == _PVT else (number,))
             readers.append((Channel(name, f"sbf/{name}", "sbf", count), reader))
+    of_ephemerides = np.isin(blocks.number, EPHEMERIS_BLOCKS)
+    if of_ephemerides.any():
+        channel = Channel("ephemerides", "sbf/ephemerides", "sbf", int(of_ephemerides.sum()))
+        readers.append((channel, lambda: _ephemerides(buffer, blocks, of_ephemerides)))
     notes = [f"{blocks.wrong} blocks have a wrong checksum and were left out"] if blocks.wrong else []
     return ChannelLog(path, "sbf", readers, notes)
+
+
+def _ephemerides(buffer: Buffer, blocks: _Blocks, own: NDArray[np.bool_]) -> Table:
+    """A row per ephemeris; the blocks of the ionosphere, and those that are damaged, make none."""
+    columns = ephemerides(buffer, blocks.start[own], blocks.size[own], blocks.number[own], blocks.t_ns[own])
+    n = len(columns["t_gps_ns"])
+    lost = int(own.sum()) - n
+    return Table(columns["t_gps_ns"], columns, n + lost, {"no ephemeris": lost} if lost else {})
 
 
 def _reader(

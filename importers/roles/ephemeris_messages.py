@@ -71,6 +71,7 @@ def _ionosphere(table: Table, near_ns: int, leap: LeapSeconds) -> tuple[Ephemeri
 EPHEMERIS_TYPES: Mapping[str, Reader] = {
     "rinex/navigation": _rinex,
     "rtcm/ephemerides": _rinex,
+    "sbf/ephemerides": _rinex,
     "sp3": _sp3,
     "ubx/RXM-SFRBX": _words,
     "ublox_msgs/RxmSFRBX": _words,

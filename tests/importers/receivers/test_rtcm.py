@@ -102,3 +102,35 @@ def test_a_wrong_checksum_costs_its_frame(folder: Path, tmp_path: Path) -> None:
     assert log.notes == ("1 frames have a wrong checksum and were left out",)
     whole = open_log(folder / "epochs.rtcm3", InputSettings(gps_week=2304)).read(("MSM",))["MSM"]
     assert 0 < log.read(("MSM",))["MSM"].read < whole.read
+
+
+GLONASS = """     3.04           N: GNSS NAV DATA    R: GLONASS          RINEX VERSION / TYPE
+                                                            END OF HEADER
+R03 2023 11 14 22 15 00-1.500000000000E-04 9.094947017729E-13 2.529000000000E+05
+     7.003008300781E+03 7.835226058960E-01 9.313225746155E-10 0.000000000000E+00
+    -1.220662597656E+04 2.804252624512E+00 0.000000000000E+00 5.000000000000E+00
+     2.128076513672E+04 1.352500915527E+00-2.793967723846E-09 0.000000000000E+00
+"""
+
+
+def test_an_ephemeris_of_glonass_is_that_of_the_navigation_file(folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "log.nav").write_text(GLONASS)
+    obs, nav, station, state = rtklib.obs_t(), rtklib.nav_t(), rtklib.sta_t(), rtklib.rtcm_t()
+    assert rtklib.readrnx(str(tmp_path / "log.nav"), 1, "", obs, nav, station) == 1
+    rtklib.init_rtcm(state)
+    eph = nav.geph[0] if nav.ng == 1 else nav.geph[2]
+    state.nav.geph[2], state.ephsat, state.time = eph, eph.sat, eph.toe
+    assert rtklib.gen_rtcm3(state, 1020, 0, 0) == 1
+    frame = encoded(state)
+    rtklib.free_rtcm(state)
+    (tmp_path / "a.rtcm3").write_bytes(frame * 2)
+    week = 2288
+    read = open_log(tmp_path / "a.rtcm3", InputSettings(gps_week=week)).read(("ephemerides",))["ephemerides"]
+    told = open_log(tmp_path / "log.nav").read(("log.nav",))["log.nav"]
+    mine, theirs = read.columns["glonass"][0], told.columns["glonass"][0]
+    assert mine["sat"] == theirs["sat"] == "R03"
+    assert mine["channel"] == theirs["channel"]
+    assert mine["tau"] == pytest.approx(theirs["tau"], abs=1e-9)
+    assert mine["gamma"] == pytest.approx(theirs["gamma"], abs=1e-12)
+    for name, tolerance in (("pos", 0.5), ("vel", 1e-3), ("acc", 1e-6)):
+        np.testing.assert_allclose(mine[name], theirs[name], atol=tolerance)

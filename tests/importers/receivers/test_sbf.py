@@ -15,6 +15,7 @@ from importers.rows.log import Table
 from navreplay.geodesy.rotation import euler_from_quat
 from navreplay.geodesy.time_scales import gps_from_week_tow
 from navreplay.timeline import FixStatus
+from synthetic_logs import SCENARIOS, simulate, with_duration, write
 
 WEEK, TOW_MS = 2288, 252_818_000
 START_NS = int(gps_from_week_tow(WEEK, np.array([TOW_MS / 1000]))[0])
@@ -45,7 +46,11 @@ def covariances(t: float) -> bytes:
 
 
 def block(number: int, content: bytes, t: float) -> bytes:
-    body = struct.pack("<IH", TOW_MS + round(1000 * t), WEEK) + content
+    return block_at(number, content, WEEK, TOW_MS + round(1000 * t))
+
+
+def block_at(number: int, content: bytes, week: int, tow_ms: int) -> bytes:
+    body = struct.pack("<IH", tow_ms, week) + content
     body += bytes(-(len(body)) % 4)
     rest = struct.pack("<HH", number, len(body) + 8) + body
     return b"$@" + struct.pack("<H", binascii.crc_hqx(rest, 0)) + rest
@@ -179,3 +184,76 @@ def test_blocks_with_right_checksums_and_any_content_are_borne(tmp_path: Path, n
 def test_blocks_behind_a_long_beginning_are_found(tmp_path: Path) -> None:
     (tmp_path / "a.sbf").write_bytes(b"$R: lstConfigFile, Current\r\n" * 2000 + pvt(0.0))
     assert open_log(tmp_path / "a.sbf").format == "sbf"
+
+
+_NAMES = {
+    "af0": "a_f0", "af1": "a_f1", "af2": "a_f2", "crs": "C_rs", "crc": "C_rc", "cuc": "C_uc", "cus": "C_us", "cic": "C_ic",
+    "cis": "C_is", "e": "e", "sqrt_a": "SQRT_A",
+}  # fmt: skip
+_SEMICIRCLES = {"delta_n": "DEL_N", "m0": "M_0", "i0": "i_0", "omega": "omega", "omega0": "OMEGA_0", "omega_dot": "OMEGADOT",
+                "idot": "IDOT"}  # fmt: skip
+_BLOCKS = {"G": ("GPSNav", "PRN", 0), "E": ("GALNav", "SVID", 70), "C": ("BDSNav", "PRN", 140)}
+
+
+def number_of(sat: str, more: int) -> int:
+    """The receiver's number of a satellite; BeiDou's beyond C40 stand apart."""
+    number = int(sat[1:])
+    return number + (182 if sat[0] == "C" and number > 40 else more)
+
+
+def ephemeris(row: np.void) -> bytes:
+    """An ephemeris as its system's block, stamped at its reference time."""
+    system = str(row["sat"])[0]
+    name, key, more = _BLOCKS[system]
+    fields = {theirs: float(row[own]) for own, theirs in _NAMES.items()}
+    fields |= {theirs: float(row[own]) / np.pi for own, theirs in _SEMICIRCLES.items()}
+    week, tow_s = divmod(int(row["toe_ns"]) // 10**9, 604_800)
+    own_s = tow_s - 14 if system == "C" else tow_s
+    fields |= {"TOW": tow_s * 1000, "WNc": week, "t_oe": own_s, "t_oc": own_s, key: number_of(str(row["sat"]), more)}
+    delays = {"G": ("T_gd",), "E": ("BGD_L1E5a", "BGD_L1E5b"), "C": ("T_GD1", "T_GD2")}[system]
+    fields |= {delay: float(value) for delay, value in zip(delays, row["tgd"], strict=False)} | (
+        {"Source": 2} if system == "E" else {}
+    )
+    return SBFMessage(name, **fields).serialize()
+
+
+def test_a_stream_of_measurements_and_ephemerides_gives_what_its_rinex_gives(tmp_path: Path) -> None:
+    write(simulate(with_duration(SCENARIOS["ranges-open"], 3.0), 7), tmp_path / "log.obs")
+    log = open_log(tmp_path / "log.nav")
+    stream = b"".join(ephemeris(row) for row in log.read(("log.nav",))["log.nav"].columns["kepler"] if row["sat"])
+    columns = open_log(tmp_path / "log.obs").read(("log.obs",))["log.obs"].columns
+    first = {"G": (0, 0), "E": (70, 17), "C": (140, 28)}
+    for t_ns in np.unique(columns["t_gps_ns"]):
+        signals = []
+        for row in np.flatnonzero(columns["t_gps_ns"] == t_ns):
+            more, kind = first[columns["sat"][row][0]]
+            doppler = -columns["range_rate"][row] / 299_792_458.0 * {0: 1575.42e6, 17: 1575.42e6, 28: 1561.098e6}[kind]
+            code = round(columns["pseudorange"][row] * 1000)
+            cn0 = round((columns["cn0"][row] - 10) / 0.25)
+            values = (0, kind, number_of(columns["sat"][row], more), code >> 32, code & 0xFFFFFFFF, round(doppler * 1e4))
+            signals.append(struct.pack("<BBBBIiHbBHBB", *values, 0, 0, cn0, 10, 0, 0))
+        content = struct.pack("<BBBBBB", len(signals), 20, 12, 0, 0, 0) + b"".join(signals)
+        week, tow_ms = divmod(int(t_ns) // 10**6, 604_800_000)
+        stream += block_at(4027, content, week, tow_ms)
+    (tmp_path / "a.sbf").write_bytes(stream)
+    before = load_timeline([tmp_path / "log.obs", tmp_path / "log.nav"]).ranges
+    after = load_timeline([tmp_path / "a.sbf"]).ranges
+    assert before is not None
+    assert after is not None
+    assert np.array_equal(before.sat, after.sat)
+    assert np.array_equal(before.t_ns, after.t_ns)
+    np.testing.assert_allclose(after.sat_pos_e, before.sat_pos_e, atol=1.0)  # the receiver's floats are single
+    np.testing.assert_allclose(after.pseudorange, before.pseudorange, atol=2.0)
+    np.testing.assert_allclose(after.range_rate, before.range_rate, atol=1e-2)
+
+
+def test_glonass_ephemerides_are_in_metres_and_gps_time(tmp_path: Path) -> None:
+    place = {"X": 7003.008, "Y": -12206.626, "Z": 21280.765, "Dx": 0.7835, "Dy": 2.8042, "Dz": 1.3525, "Ddx": 0.0, "Ddz": -2e-9}
+    told = {"SVID": 40, "FreqNr": 13, "tau": -1.5e-4, "gamma": 1e-12, "t_oe": 252_918, "B": 0}
+    message = SBFMessage("GLONav", scaling=False, **stamp(0.0), **place, **told)
+    (tmp_path / "a.sbf").write_bytes(message.serialize() + measurements(0.0))
+    row = open_log(tmp_path / "a.sbf").read(("ephemerides",))["ephemerides"].columns["glonass"][0]
+    assert (row["sat"], row["channel"], row["toe_ns"]) == ("R03", 5, START_NS + 100 * 10**9)
+    np.testing.assert_allclose(row["pos"], [7_003_008.0, -12_206_626.0, 21_280_765.0])
+    np.testing.assert_allclose(row["vel"], [783.5, 2804.2, 1352.5], rtol=1e-6)
+    assert row["tau"] == pytest.approx(-1.5e-4)
