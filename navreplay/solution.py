@@ -63,11 +63,13 @@ class WeightSeries:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something worth telling at a time: alignment, gap, run of rejections, reset. level: ``info`` or ``warning``."""
+    """Something worth telling at a time: alignment, gap, run of rejections, reset. level: ``info`` or ``warning``. kind:
+    ``restart`` or ``lock-out`` where those are to be counted, else empty."""
 
     t_ns: int
     level: str
     text: str
+    kind: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +90,8 @@ class Solution:
     NED [m], velocity NED [m/s] and rotation vector in n [rad] (true attitude = exp(phi x) computed attitude).
     status: (k,) int8 of RowStatus. method: name of the preset. estimated: figures of the noise that a method found in the whole
     log and filtered with, by their names in `FilterOptions` and what it holds; empty for other methods. weights: of a bank.
+    backward: of a smoothed solution, the median normalised square of the horizontal difference between forward and smoothed
+    positions over its expected value; else None.
     """
 
     t_ns: Times
@@ -106,6 +110,7 @@ class Solution:
     outages: tuple[Outage, ...] = ()
     estimated: Mapping[str, float | tuple[float, float]] = field(default_factory=dict)
     weights: WeightSeries | None = None
+    backward: float | None = None
 
     def __len__(self) -> int:
         return len(self.t_ns)

@@ -14,7 +14,8 @@ EXPORT_FORMATS = ("csv", "parquet", "tum", "kitti", "kml", "geojson", "pos", "sb
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Runs one command and returns the exit code: 0, 1 for input that cannot be used, 2 for wrong usage, 130 for Ctrl-C."""
+    """Runs one command and returns the exit code: 0, 1 for input that cannot be used, 2 for wrong usage, 3 for a
+    poor verdict where --strict was given, 130 for Ctrl-C."""
     arguments = _build_parser().parse_args(argv)
     try:
         return _run(arguments)
@@ -32,12 +33,12 @@ def _run(arguments: argparse.Namespace) -> int:
     from navreplay.timeline import LogError
 
     try:
-        command.run(arguments)
+        code: int = command.run(arguments) or 0
         sys.stdout.flush()
     except LogError as error:
         print(f"navreplay: error: {error}", file=sys.stderr)
         return 1
-    return 0
+    return code
 
 
 class _Version(argparse.Action):
@@ -110,6 +111,8 @@ def _add_run(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
     parser = _add_command(commands, "run", "process a drive: solution, report and recording")
     _add_logs(parser)
     parser.add_argument("--filter", metavar="NAME", help="method, see 'navreplay filters'")
+    parser.add_argument("--strict", action="store_true", help="exit with 3 where the verdict is poor")
+    parser.add_argument("--quick", action="store_true", help="do not try which setting would help most")
     _add_processing(parser)
 
 

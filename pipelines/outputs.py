@@ -22,6 +22,7 @@ from pipelines.report.figures import report_plots
 from pipelines.report.html import render_html
 from pipelines.report.markdown import render_markdown
 from pipelines.report.tables import headline_figures, report_tables
+from pipelines.report.verdict import verdict_notice
 from pipelines.trajectory.launch_csv import write_launch_csv
 from pipelines.trajectory.solution_csv import utc_text, write_solution_csv
 
@@ -37,9 +38,9 @@ def write_outputs(result: RunResult, out_dir: str | Path) -> dict[str, Path]:
     recording.rrd. Returns the paths by name. Raises LogError when the folder cannot be written."""
     report = build_report(result)
     title, subtitle = _title(result)
-    figures, tables = headline_figures(report), report_tables(report)
-    html = render_html(title, subtitle, figures, report_plots(result), tables, report["configuration"])
-    markdown = render_markdown(title, figures, tables)
+    figures, tables, notice = headline_figures(report), report_tables(report), verdict_notice(report["verdict"])
+    html = render_html(title, subtitle, figures, report_plots(result), tables, report["configuration"], notice)
+    markdown = render_markdown(title, figures, tables, notice)
     writers: dict[str, Callable[[Path], object]] = {
         "solution.csv": lambda path: write_solution_csv(path, result.solution),
         "report.json": lambda path: path.write_text(dump_json(report), encoding="utf-8"),

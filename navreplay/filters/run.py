@@ -15,7 +15,7 @@ from navreplay.error_models.error_model import ErrorModel
 from navreplay.filters.consider import Setup, check_considers, set_up
 from navreplay.filters.epochs import output_times, run_epochs
 from navreplay.filters.presets import Method
-from navreplay.filters.rows import Rows
+from navreplay.filters.rows import Rows, backward_agreement
 from navreplay.filters.trace import Traces
 from navreplay.filters.trial import settle_attitude
 from navreplay.filters.update import Estimator
@@ -164,6 +164,7 @@ def _join(rows: list[Rows], method: str, model: ErrorModel, recorder: Recorder) 
         innovations=recorder.series(),
         weights=recorder.weight_series(),
         events=tuple(sorted(recorder.events, key=lambda event: event.t_ns)),
+        backward=backward_agreement([row.agreement for row in rows if row.agreement is not None]),
     )
 
 
@@ -197,7 +198,7 @@ def _run_stretch(
         except LogError as error:
             start_ns, state, cov = lost_ns, NavState.unpack(rows.states[-1]), rows.covariances[-1]
             text = f"the filter keeps contradicting its measurements and could not be started anew: {error}"
-        recorder.tell(lost_ns, "warning", text)
+        recorder.tell(lost_ns, "warning", text, kind="restart")
 
 
 def _start(

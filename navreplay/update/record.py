@@ -73,9 +73,9 @@ class Recorder:
         self.times.setdefault(kind, []).append(t_ns)
         self.rows.setdefault(kind, []).append(rows)
 
-    def tell(self, t_ns: int, level: str, text: str) -> None:
+    def tell(self, t_ns: int, level: str, text: str, kind: str = "") -> None:
         """An event at t_ns."""
-        self.events.append(Event(t_ns, level, text))
+        self.events.append(Event(t_ns, level, text, kind))
 
     def weigh(self, t_ns: int, labels: tuple[str, ...], weights: Floats) -> None:
         """Weights (M,) of a bank's hypotheses at t_ns, the same labels at every epoch."""

@@ -60,6 +60,7 @@ def tell_widening(recorder: Recorder, t_ns: int, widening: Widening) -> None:
         "warning",
         f"{kind}: {widening.run} epochs in a row ({widening.seconds:.0f} s) contradicted the filter; its uncertainty of what "
         f"they measure was raised by {sqrt(widening.variance):.2g} {unit}, and they are used again",
+        kind="lock-out",
     )
 
 

@@ -6,7 +6,7 @@ from math import pi
 from navreplay.solution import Solution
 from pipelines.config.spec import Config, apply_sets, dump_toml, validate
 
-__all__ = ["estimated_toml"]
+__all__ = ["estimated_config", "estimated_toml"]
 
 _DEG = pi / 180
 _UG = 9.80665e-6
@@ -31,12 +31,17 @@ _KEYS = {
 
 
 def estimated_toml(config: Config, solution: Solution) -> str:
+    """`estimated_config` as a file."""
+    note = f"# Noise found by {solution.method} in this log; everything else as it was configured.\n"
+    return note + dump_toml(estimated_config(config, solution))
+
+
+def estimated_config(config: Config, solution: Solution) -> Config:
     """The configuration of a run with the figures that its method found, for the fixed filter."""
     sets = [f"{_KEYS[name][0]}={_in_unit(value, _KEYS[name][1])}" for name, value in solution.estimated.items()]
     data = config.model_dump(mode="json", exclude_none=True)
     data["filter"] = {**data["filter"], "name": "fixed", "parameters": {}}
-    note = f"# Noise found by {solution.method} in this log; everything else as it was configured.\n"
-    return note + dump_toml(validate(apply_sets(data, sets), "config.estimated.toml"))
+    return validate(apply_sets(data, sets), "config.estimated.toml")
 
 
 def _in_unit(value: float | tuple[float, float], unit: float) -> str:

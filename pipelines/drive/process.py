@@ -14,11 +14,13 @@ from importers.preflight.checks import preflight
 from importers.vetting.vet import vet
 from navreplay.evaluation.metrics import evaluate, find_outages
 from navreplay.evaluation.sky import view_sky
+from navreplay.evaluation.verdict import judge
 from navreplay.filters.presets import build_method
 from navreplay.filters.run import run_filter
 from navreplay.solution import Solution
 from navreplay.timeline import Floats, GnssFixSeries, LogError, RangeSeries, Timeline
 from pipelines.config.spec import Config
+from pipelines.drive.advice import advise
 from pipelines.drive.outages import outage_windows, withhold_fixes, withhold_ranges
 from pipelines.drive.result import RunResult
 from pipelines.drive.set_up import find_set_up, options_of
@@ -41,13 +43,13 @@ class Drive:
     forward: float = 0.0
 
 
-def process(paths: Sequence[str | Path], config: Config, progress: Progress | None = None) -> RunResult:
-    """Reads the logs as one drive and filters it as configured.
+def process(paths: Sequence[str | Path], config: Config, progress: Progress | None = None, advised: bool = False) -> RunResult:
+    """Reads the logs as one drive and filters it as configured. advised: where the verdict is not good, try what would help.
 
     Raises LogError for logs that cannot be read, that preflight refuses, or that the filter cannot start on.
     """
     build_method(config.filter.name, config.filter.parameters)  # a misspelled method should not cost the time of reading
-    return filter_drive(read_drive(paths, config, progress), config, progress)
+    return filter_drive(read_drive(paths, config, progress), config, progress, advised)
 
 
 def read_drive(paths: Sequence[str | Path], config: Config, progress: Progress | None = None) -> Drive:
@@ -73,8 +75,8 @@ def _one_of_a_kind(findings: Sequence[Finding]) -> tuple[Finding, ...]:
     return tuple(once.values())
 
 
-def filter_drive(drive: Drive, config: Config, progress: Progress | None = None) -> RunResult:
-    """The drive through the configured filter, evaluated against the reference if there is one."""
+def filter_drive(drive: Drive, config: Config, progress: Progress | None = None, advised: bool = False) -> RunResult:
+    """The drive through the configured filter, evaluated against the reference if there is one. advised: see `process`."""
     timing = dict(drive.timing_s)
     timeline = drive.timeline
     method = build_method(config.filter.name, config.filter.parameters)
@@ -85,7 +87,13 @@ def filter_drive(drive: Drive, config: Config, progress: Progress | None = None)
         solution = replace(solution, outages=find_outages(solution, _simulated_windows(timeline, config)))
         evaluation = None if timeline.reference is None else evaluate(solution, timeline.reference, _reference_lever(timeline))
         sky = None if used.ranges is None else view_sky(used.ranges, solution)
-    return RunResult(config, timeline, used, _at_output_point(solution, used, config), evaluation, sky, drive.findings, timing)
+        verdict = judge(solution, used)
+    advice = None
+    if advised and verdict.grade != "good":
+        with _stage("advising", timing, progress):
+            advice = advise(used, config, drive.forward, solution)
+    moved = _at_output_point(solution, used, config)
+    return RunResult(config, timeline, used, moved, evaluation, verdict, advice, sky, drive.findings, timing)
 
 
 def _aiding(timeline: Timeline, config: Config) -> GnssFixSeries | RangeSeries | None:

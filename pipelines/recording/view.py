@@ -17,6 +17,7 @@ from pipelines.recording.paint import BLUE, GREY, PALE, RED, time_columns
 from pipelines.recording.series import list_stacks, send_biases, send_errors, send_innovations, send_weights
 from pipelines.recording.sky import send_sky
 from pipelines.report.content import outage_errors
+from pipelines.report.verdict import describe_verdict
 
 __all__ = ["recording_id", "write_recording"]
 
@@ -24,6 +25,7 @@ _APPLICATION = "navreplay"
 _ELLIPSOIDS = 200
 _ASPECT, _MAP_ASPECT = 1.5, 2.1
 """Width over height of the two views, for the track to fit into."""
+_GRADE_LEVELS = {"good": "info", "fair": "warning", "poor": "error"}
 _FIX_COLORS = {
     FixStatus.UNKNOWN: GREY,
     FixStatus.SINGLE: (235, 130, 40),
@@ -52,6 +54,8 @@ def write_recording(path: Path, result: RunResult) -> None:
         recording.set_log_tick_enabled(False)
         recording.save(path, default_blueprint=_layout(result, track))
         recording.send_recording_name(f"{_APPLICATION}: {solution.method}")
+        described = describe_verdict(result)
+        recording.send_property("verdict", rr.AnyValues(grade=described["grade"], summary=described["summary"]))
         _send_track(recording, solution, track)
         _send_reference_and_fixes(recording, result, origin)
         _send_outage_tracks(recording, result, track)
@@ -158,13 +162,13 @@ def _send_events(recording: rr.RecordingStream, result: RunResult) -> None:
     solution = result.solution
     begin = int(solution.t_ns[0])
     # the cursor opens at the first time there is, and that should be one with something to see
-    rows = [(max(event.t_ns, begin), event.level, event.text) for event in solution.events]
+    described = describe_verdict(result)
+    rows = [(begin, _GRADE_LEVELS[described["grade"]], "\n".join([f"verdict: {described['summary']}", *described["lines"]]))]
+    rows += [(max(event.t_ns, begin), event.level, event.text) for event in solution.events]
     rows += [(begin, finding.level, finding.text) for finding in result.findings]
     for errors in outage_errors(result):
         end = "" if np.isnan(errors.end_horizontal) else f", horizontal error at its end {errors.end_horizontal:.2f} m"
         rows.append((errors.outage.start_ns, "info", f"outage of {errors.length_s:.1f} s ({errors.outage.cause}) begins{end}"))
-    if not rows:
-        return
     rows.sort(key=lambda row: row[0])
     t_ns, levels, texts = zip(*rows, strict=True)
     columns = rr.TextLog.columns(text=list(texts), level=[_level(level) for level in levels])

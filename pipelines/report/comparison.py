@@ -23,11 +23,25 @@ __all__ = [
     "comparison_plots",
     "comparison_tables",
     "overview_table",
+    "verdict_table",
 ]
 
 _SCHEMA = "navreplay comparison 1"
 _COMMON = ("versions", "channels", "files", "assumptions", "damage", "findings", "configuration")
-_OWN = ("drive", "errors", "nees", "within_3_sigma", "nis", "innovations", "satellites", "outages", "events", "timing_s")
+_OWN = (
+    "verdict",
+    "warnings",
+    "drive",
+    "errors",
+    "nees",
+    "within_3_sigma",
+    "nis",
+    "innovations",
+    "satellites",
+    "outages",
+    "events",
+    "timing_s",
+)
 _HEADLINES = {"position": "3d", "velocity": "3d", "attitude": "heading"}
 _STRETCHES = {"all": "whole drive", "outside": "outside outages", "inside": "inside outages"}
 _STYLES = tuple(f"c{number}" for number in range(1, 7))
@@ -88,7 +102,7 @@ def comparison_tables(report: Report) -> tuple[Table, ...]:
     """The overview, what could not run, and one table per quantity, a row per method."""
     methods = report["methods"]
     failures = Table("Could not run", ("method", "reason"), tuple(report["failures"].items()))
-    tables = [table for table in (overview_table(report), failures) if table.rows]
+    tables = [table for table in (overview_table(report), verdict_table(report), failures) if table.rows]
     first = next(iter(methods.values()))
     if first["errors"] is not None:
         for quantity in first["errors"]["all"]:
@@ -110,6 +124,19 @@ def overview_table(report: Report) -> Table:
     stretch = "outside outages, which last until a fix is used again" if outages else "whole drive"
     note = f"Errors are RMS, {stretch}; NEES over its expected value: 1 is right."
     return Table("Overview", ("method", *heads), rows, note)
+
+
+def verdict_table(report: Report) -> Table:
+    """The verdict on each run."""
+    rows = []
+    for label, method in report["methods"].items():
+        verdict = method["verdict"]
+        expected = verdict["expected_horizontal_m"]
+        shares = (f"{kind.replace('_', ' ')} {use['used']} of {use['read']}" for kind, use in verdict["kinds"].items())
+        figures = figure_text(expected["median"], "m"), figure_text(expected["p95"], "m")
+        rows.append((label, verdict["grade"], verdict["limited_by"], *figures, ", ".join(shares)))
+    header = ("method", "verdict", "limited by", "expected horizontal median", "95 %", "used")
+    return Table("Verdict", header, tuple(rows), "Expected is what the covariance says, corrected by the innovations.")
 
 
 def _headline_columns(method: Mapping[str, Any], stretch: str) -> dict[str, float | None]:

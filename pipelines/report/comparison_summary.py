@@ -24,6 +24,7 @@ def comparison_values(comparison: Comparison) -> dict[str, object]:
 
 def _method_values(label: str, method: Mapping[str, Any]) -> dict[str, object]:
     values = {"label": label, "value": method["value"]}
+    values |= {"verdict": method["verdict"], "warnings": method["warnings"]}
     values |= {key: method["drive"][key] for key in ("method", "rows", "duration_s")}
     values["timing_s"] = {stage: round(seconds, 3) for stage, seconds in method["timing_s"].items()}
     if method["errors"] is not None:
@@ -45,7 +46,9 @@ def summarise_comparison(comparison: Comparison) -> list[str]:
     """Lines for the terminal: what was processed, what looked wrong, how good each run is, what could not run."""
     first = comparison.drawn[0][1]
     minutes = (int(first.solution.t_ns[-1]) - int(first.solution.t_ns[0])) / 60e9
-    overview = overview_table(build_comparison(comparison))
+    report = build_comparison(comparison)
+    overview = overview_table(report)
     lines = [f"{len(comparison.reports)} runs of {minutes:.1f} min", *describe_log(first)]
     lines += [*table_lines(overview), overview.note] if overview.rows else [NO_REFERENCE]
+    lines += [f"verdict: {label}: {method['verdict']['summary']}" for label, method in report["methods"].items()]
     return lines + [f"could not run: {variant.label}: {reason}" for variant, reason in comparison.failures]

@@ -28,6 +28,7 @@ from navreplay.timeline import Provenance
 from pipelines.drive.result import RunResult
 from pipelines.report.plain_data import plain_data
 from pipelines.report.satellites import describe_satellites
+from pipelines.report.verdict import describe_verdict, group_warnings
 from pipelines.trajectory.solution_csv import utc_text
 
 __all__ = ["Report", "build_report", "dump_json", "outage_errors"]
@@ -46,6 +47,7 @@ def build_report(result: RunResult) -> Report:
     return {
         "schema": _SCHEMA,
         "versions": _versions(),
+        "verdict": describe_verdict(result),
         "drive": _describe_drive(solution),
         "errors": None if evaluation is None else _describe_errors(evaluation),
         "nees": None if evaluation is None else {name: plain_data(judged) for name, judged in evaluation.nees.items()},
@@ -62,6 +64,7 @@ def build_report(result: RunResult) -> Report:
         },
         **_describe_provenance(result.timeline.provenance),
         "findings": [asdict(finding) for finding in result.findings],
+        "warnings": group_warnings(solution),
         "events": _describe_events(solution),
         "configuration": plain_data(result.config.model_dump(mode="json")),
         "timing_s": plain_data(result.timing_s),

@@ -7,11 +7,12 @@ from html import escape
 from importlib.resources import files
 
 from pipelines.plotting.plot import Plot
-from pipelines.report.table import Figure, Table
+from pipelines.report.table import Figure, Notice, Table
 
 __all__ = ["render_html"]
 
 _FIGURE_CELL = re.compile(r"[-−–]?[\d.,]*(e[-+]?\d+)?( ± [\d.,]+(e[-+]?\d+)?)?( ?(%|s|m|m/s|deg))?")
+_LEVELS = ("warning", "error", "good", "fair", "poor")
 _SAMPLES = {
     "line": '<path class="{}" d="M1 5H19"/>',
     "band": '<path class="{}" d="M1 1H19V9H1Z"/>',
@@ -27,8 +28,9 @@ def render_html(
     plots: Sequence[Plot],
     tables: Sequence[Table],
     configuration: Mapping[str, object],
+    notice: Notice | None = None,
 ) -> str:
-    """The page. All texts are escaped here; drawings come ready."""
+    """The page, with a notice on top. All texts are escaped here; drawings come ready."""
     assets = files("pipelines.report") / "assets"
     config = escape(json.dumps(configuration, indent=1, ensure_ascii=False))
     return "".join(
@@ -36,7 +38,9 @@ def render_html(
             '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">',
             '<meta name="viewport" content="width=device-width, initial-scale=1">',
             f"<title>{escape(title)}</title><style>{(assets / 'report.css').read_text('utf-8')}</style></head>\n<body><main>",
-            f'<h1>{escape(title)}</h1><p class="dim">{escape(subtitle)}</p>\n<div class="figures">',
+            f'<h1>{escape(title)}</h1><p class="dim">{escape(subtitle)}</p>\n',
+            "" if notice is None else _render_notice(notice),
+            '<div class="figures">',
             *(_render_figure(figure) for figure in figures),
             '</div>\n<div class="plots">',
             *(_render_plot(plot) for plot in plots),
@@ -46,6 +50,11 @@ def render_html(
             f"<script>{(assets / 'report.js').read_text('utf-8')}</script></body></html>\n",
         ]
     )
+
+
+def _render_notice(notice: Notice) -> str:
+    items = "".join([f"<li>{escape(line)}</li>" for line in notice.lines])
+    return f'<section class="notice {escape(notice.level)}"><h2>{escape(notice.title)}</h2><ul>{items}</ul></section>\n'
 
 
 def _render_figure(figure: Figure) -> str:
@@ -79,8 +88,7 @@ def _render_table(table: Table) -> str:
     rows = []
     for row in table.rows:
         cells = [
-            f"<td{f' class={cell}' if cell in ('warning', 'error') else m}>{escape(cell)}</td>"
-            for m, cell in zip(mark, row, strict=True)
+            f"<td{f' class={cell}' if cell in _LEVELS else m}>{escape(cell)}</td>" for m, cell in zip(mark, row, strict=True)
         ]
         rows.append(f"<tr>{''.join(cells)}</tr>")
     note = f'<p class="note">{escape(table.note)}</p>' if table.note else ""

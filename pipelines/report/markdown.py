@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from pipelines.report.table import Figure, Table
+from pipelines.report.table import Figure, Notice, Table
 
 __all__ = ["render_markdown"]
 
@@ -24,9 +24,11 @@ def _render_table(table: Table) -> str:
     return f"## {table.title}\n\n" + "\n".join(lines) + note + "\n"
 
 
-def render_markdown(title: str, figures: Sequence[Figure], tables: Sequence[Table]) -> str:
-    """The report as Markdown; texts that come from logs are escaped."""
+def render_markdown(title: str, figures: Sequence[Figure], tables: Sequence[Table], notice: Notice | None = None) -> str:
+    """The report as Markdown, a notice first; texts that come from logs are escaped."""
     headline = []
+    if notice is not None:
+        headline = [f"**{_escape(notice.title)}**\n", *(f"- {_escape(line)}" for line in notice.lines), ""]
     for figure in figures:
         context = f" ({_escape(figure.context)})" if figure.context else ""
         headline.append(f"- {_escape(figure.name)}: **{_escape(figure.value)}**{context}")

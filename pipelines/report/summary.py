@@ -6,10 +6,15 @@ from pathlib import Path
 
 from navreplay.evaluation.metrics import Evaluation, summarise_outages
 from navreplay.evaluation.outages import count_outages
+from navreplay.solution import Solution
 from navreplay.timeline import Provenance
 from pipelines.drive.result import RunResult
+from pipelines.report.verdict import describe_verdict, group_warnings
 
-__all__ = ["NO_REFERENCE", "describe_log", "describe_outputs", "headline_figures", "summarise_run"]
+__all__ = ["NO_REFERENCE", "describe_log", "describe_outputs", "describe_verdict_lines", "headline_figures", "summarise_run"]
+
+_COLOURS = {"good": 32, "fair": 33, "poor": 31}
+"""Of a terminal: green, yellow, red."""
 
 NO_REFERENCE = "no reference, so no errors; give one with --reference"
 
@@ -22,6 +27,8 @@ def headline_figures(result: RunResult) -> dict[str, object]:
         "rows": len(solution),
         "duration_s": (int(solution.t_ns[-1]) - int(solution.t_ns[0])) / 1e9,
         "findings": [{"level": f.level, "code": f.code, "text": f.text} for f in result.findings],
+        "verdict": describe_verdict(result),
+        "warnings": group_warnings(solution),
         "timing_s": {stage: round(seconds, 3) for stage, seconds in result.timing_s.items()},
     }
     if result.evaluation is not None:
@@ -57,10 +64,28 @@ def summarise_run(result: RunResult) -> list[str]:
     solution = result.solution
     minutes = (int(solution.t_ns[-1]) - int(solution.t_ns[0])) / 60e9
     lines = [f"{solution.method}: {minutes:.1f} min, {len(solution)} rows, {sum(result.timing_s.values()):.1f} s to process"]
-    lines += describe_log(result)
+    lines += describe_log(result) + _describe_warnings(result.solution)
     if result.evaluation is None:
         return [*lines, NO_REFERENCE]
     return lines + _describe_errors(result.evaluation)
+
+
+def _describe_warnings(solution: Solution) -> list[str]:
+    """What the filter warned of, in as many lines as there are kinds of it."""
+    lines = []
+    for group in group_warnings(solution):
+        count = f" ({group['count']} times, first at" if group["count"] > 1 else " (at"
+        lines.append(f"warning: {group['text']}{count} {group['utc'].partition('T')[2][:10]})")
+    return lines
+
+
+def describe_verdict_lines(result: RunResult, colour: bool = False) -> list[str]:
+    """The verdict for the end of the terminal's output, its first line in the colour of its grade where asked."""
+    described = describe_verdict(result)
+    first = f"verdict: {described['summary']}"
+    if colour:
+        first = f"\033[1;{_COLOURS[described['grade']]}m{first}\033[0m"
+    return [first, *(f"  {line}" for line in described["lines"])]
 
 
 def describe_log(result: RunResult) -> list[str]:

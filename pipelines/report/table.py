@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from math import floor, log10
 
-__all__ = ["Figure", "Table", "figure_text", "interval_text", "table_lines"]
+__all__ = ["Figure", "Notice", "Table", "figure_text", "interval_text", "table_lines"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -13,6 +13,15 @@ class Figure:
     name: str
     value: str
     context: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Notice:
+    """What stands above all else: its level (``good``, ``fair`` or ``poor``), a title, and sentences."""
+
+    level: str
+    title: str
+    lines: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)

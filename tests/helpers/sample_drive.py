@@ -4,6 +4,7 @@ import numpy as np
 
 from importers.findings import Finding
 from navreplay.evaluation.metrics import evaluate, find_outages
+from navreplay.evaluation.verdict import judge
 from navreplay.geodesy.earth import move_lla
 from navreplay.geodesy.rotation import quat_from_euler, quat_from_rotvec, quat_multiply
 from navreplay.geodesy.time_scales import gps_from_week_tow
@@ -176,6 +177,7 @@ def make_result(solution: Solution | None = None, topic: str = "/gps/fix", with_
         used=timeline,
         solution=solution,
         evaluation=evaluate(solution, timeline.reference) if timeline.reference is not None else None,
+        verdict=judge(solution, timeline),
         findings=(Finding("warning", "imu-rate", "The IMU rate varies by 12 %.", "Check the driver's stamps."),),
         timing_s={"read": 0.4, "filter": 0.2},
     )

@@ -97,6 +97,26 @@ def test_run_tells_where_results_lie_and_how_good_they_are(folder, log, capsys):
     assert "horizontal error" in printed
 
 
+def test_a_poor_run_says_so_and_fails_only_where_asked(folder, log, capsys):
+    poor = ["run", str(log), "--filter", "fixed", "--set", "gnss.position_noise_scale=0.02", "--set", "output.recording=false"]
+    assert cli.main([*poor, "--quick", "-o", str(folder / "poor")]) == 0
+    printed = capsys.readouterr().out
+    assert "verdict: poor: " in printed
+    assert "of position were rejected" in printed
+    assert "most likely to help" not in printed
+    assert cli.main([*poor, "--strict", "--json", "-o", str(folder / "strict")]) == 3
+    told = json.loads(capsys.readouterr().out)
+    assert told["verdict"]["grade"] == "poor"
+    assert told["verdict"]["setting"]["tried"] > 8
+    events = json.loads((folder / "strict" / "report.json").read_text())["events"]
+    assert sum(warning["count"] for warning in told["warnings"]) == sum(event["level"] == "warning" for event in events) > 0
+
+
+def test_a_good_run_is_good_with_strict_too(folder, log, capsys):
+    assert cli.main(["run", str(log), "--strict", "--set", "output.recording=false", "-o", str(folder / "good")]) == 0
+    assert "\nverdict: good: " in capsys.readouterr().out
+
+
 def test_the_same_run_twice_gives_the_same_bytes(folder, log, out):
     again = folder / "again"
     assert cli.main(["run", str(log), "--reference", str(log.with_suffix(".truth.csv")), "-o", str(again), "--quiet"]) == 0

@@ -89,6 +89,14 @@ def test_events_hold_outages_and_findings(recording: Path) -> None:
     assert {row[0] for row in table["TextLog:level"].to_pylist()} == {"INFO", "WARN"}
 
 
+def test_the_verdict_is_the_first_event_and_a_property(recording: Path, result: RunResult) -> None:
+    first = read_entity(recording, "/events")["TextLog:text"].to_pylist()[0][0]
+    assert first.startswith(f"verdict: {result.verdict.grade}")
+    assert "position: " in first
+    table = read_entity(recording, "/__properties/verdict", static=True)
+    assert table["grade"].to_pylist() == [[result.verdict.grade]]
+
+
 def test_run_without_reference_and_fixes_is_recorded(tmp_path: Path) -> None:
     result = make_result(with_reference=False)
     bare = replace(result, used=replace(result.used, fixes=None), timeline=replace(result.timeline, fixes=None))

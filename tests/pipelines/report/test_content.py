@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from navreplay.solution import Event
 from navreplay.timeline import LogError
 from pipelines.config.sections import OutputSection
 from pipelines.drive.result import RunResult
@@ -16,6 +17,7 @@ from pipelines.outputs import write_outputs
 from pipelines.report.content import build_report, dump_json
 from pipelines.report.table import figure_text, interval_text
 from pipelines.report.tables import headline_figures, report_tables
+from pipelines.report.verdict import group_warnings
 from tests.helpers.paths import ROOT
 from tests.helpers.sample_drive import make_result, make_solution
 
@@ -88,6 +90,28 @@ def test_json_holds_the_documented_keys(folder: Path) -> None:
     assert report["configuration"]["filter"]["name"] == "checked"
     innovations = report["innovations"]["position"]
     assert innovations["read"] == innovations["used"] + sum(innovations["rejected"].values())
+
+
+def test_the_verdict_stands_on_top(folder: Path, result: RunResult) -> None:
+    report = json.loads((folder / "report.json").read_text())
+    described = report["verdict"]
+    documented = (ROOT / "docs/report.md").read_text()
+    assert all(f"`{key}`" in documented for key in [*described, *described["kinds"]["position"], *described["fixes"]])
+    assert described["grade"] == result.verdict.grade
+    kind = described["kinds"]["position"]
+    assert kind["read"] == kind["used"] + kind["rejected"]
+    html, markdown = (folder / "report.html").read_text(), (folder / "report.md").read_text()
+    assert f'<section class="notice {described["grade"]}"><h2>Verdict: {described["grade"]}: ' in html
+    assert markdown.splitlines()[2].startswith(f"**Verdict: {described['grade']}: ")
+    assert sum(line.startswith("- position: ") for line in markdown.splitlines()) == 1
+
+
+def test_warnings_that_differ_in_figures_alone_are_counted_together() -> None:
+    base = make_solution()
+    texts = [f"position: {k} epochs in a row contradicted the filter" for k in range(40)] + ["a gap of 3.0 s"]
+    events = tuple(Event(int(base.t_ns[k]), "warning", text) for k, text in enumerate(texts))
+    grouped = group_warnings(replace(base, events=(Event(int(base.t_ns[0]), "info", "aligned"), *events)))
+    assert [(group["text"], group["count"]) for group in grouped] == [(texts[0], 40), (texts[-1], 1)]
 
 
 def test_json_agrees_with_the_evaluation(result: RunResult) -> None:
