@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from importers.text.dialect import decimal_comma, find_header, guess_delimiter, mask_quoted, unmask
 from importers.text.unix_compress import is_compressed, unpack
 from navreplay.timeline import LogError
 
@@ -76,16 +77,15 @@ def parse_text(
 
     A line with another number of fields than most, or with zero bytes in it, is rejected.
     """
-    data = data.replace(b'"', b"").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    data = mask_quoted(data.replace(b"\r\n", b"\n").replace(b"\r", b"\n"), " ,;\t" if delimiter == " " else ",;\t")
     buffer = np.frombuffer(data, dtype=np.uint8)
     starts, ends = _split_lines(buffer, skip_rows, comment)
     head = [bytes(buffer[s:e]).decode(errors="replace") for s, e in zip(starts[:_HEAD_LINES], ends[:_HEAD_LINES], strict=True)]
     if delimiter == "auto":
-        delimiter = _guess_delimiter(head)
-    names: tuple[str, ...] = ()
-    if head and (_looks_like_header(head[0], delimiter) if header == "auto" else header):
-        names = tuple(field.strip() for field in _split_fields(head[0], delimiter))
-        starts, ends = starts[1:], ends[1:]
+        delimiter = guess_delimiter(head)
+    names, before = find_header(head, delimiter, header)
+    starts, ends = starts[before:], ends[before:]
+    comma = decimal_comma(head[before:], delimiter)
     if len(starts) == 0:
         return TextTable(names, _parse_lines(b"", delimiter, 0), 0, {})
     fields = _count_fields(buffer, starts, ends, delimiter)
@@ -94,6 +94,7 @@ def parse_text(
     odd = ~damaged & (fields != expected)
     good = ~damaged & ~odd
     lines = _join_lines(buffer, starts[good], ends[good])
+    lines = lines.replace(comma, b".") if comma else lines
     frame = _parse_lines(lines, delimiter, expected)
     counts = {"zero bytes in the line": int(damaged.sum()), "wrong number of fields": int(odd.sum())}
     rejected = {reason: count for reason, count in counts.items() if count}
@@ -124,7 +125,8 @@ def select_columns(
     kept = frame[~bad] if bad.any() else frame
     columns = {name: _to_numbers(kept[index], name in integers) for name, index in numbers.items()}
     for name, index in (texts or {}).items():
-        columns[name] = kept[index].astype(object).where(kept[index].notna(), "").astype(str).to_numpy(dtype=object)
+        cells = kept[index].astype(object).where(kept[index].notna(), "").astype(str)
+        columns[name] = np.array([unmask(cell) for cell in cells], dtype=object)
     rejected = dict(table.rejected)
     if bad.any():
         rejected["not a number"] = int(bad.sum())
@@ -166,23 +168,6 @@ def _split_lines(buffer: NDArray[np.uint8], skip_rows: int, comment: str | None)
 
 def _count_marks(marks: np.ndarray, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
     return np.asarray(np.searchsorted(marks, ends) - np.searchsorted(marks, starts))
-
-
-def _guess_delimiter(head: Sequence[str]) -> str:
-    lines = head[1:] or head
-    per_line = {mark: float(np.median([line.count(mark) for line in lines])) for mark in ",;\t"} if lines else {}
-    best = max(per_line, key=lambda mark: per_line[mark], default=" ")
-    return best if per_line.get(best, 0) >= 1 else " "
-
-
-def _split_fields(line: str, delimiter: str) -> list[str]:
-    return line.split() if delimiter == " " else line.rstrip("\r").split(delimiter)
-
-
-def _looks_like_header(line: str, delimiter: str) -> bool:
-    fields = [field.strip() for field in _split_fields(line, delimiter) if field.strip()]
-    words = sum(field[0].isalpha() and field.lower() not in ("nan", "inf") for field in fields)
-    return 2 * words > len(fields)
 
 
 def _count_fields(buffer: NDArray[np.uint8], starts: np.ndarray, ends: np.ndarray, delimiter: str) -> np.ndarray:
