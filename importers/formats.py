@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from importers.containers.file_bytes import is_bag_folder
@@ -15,7 +16,7 @@ from importers.rinex.sp3 import is_sp3, read_sp3
 from importers.rinex.text import other_kind
 from importers.rows.clock import leap_seconds
 from importers.rows.log import Log
-from importers.settings import InputSettings
+from importers.settings import CsvMapping, InputSettings
 from importers.streams import (
     open_dataflash_log,
     open_novatel_stream,
@@ -25,10 +26,11 @@ from importers.streams import (
     open_ulog,
 )
 from importers.text.csv_layouts import find_layout, read_layout
-from importers.text.csv_mapping import find_mapping, read_mapped
+from importers.text.csv_mapping import find_mappings, read_mapped
 from importers.text.csv_ranges import OWN_RANGES
+from importers.text.headers import draft_table
 from importers.text.kf_gins import find_kf_gins, read_gnss, read_imu
-from importers.text.log import TextLog
+from importers.text.log import TableLog, TextLog
 from importers.text.nmea import is_nmea, read_nmea
 from importers.text.rtklib_pos import is_pos, read_pos
 from importers.text.smartphone import is_smartphone, read_smartphone
@@ -92,10 +94,8 @@ def _stand_in(path: str, place: Path, owner: Scratch, local: str, note: str, set
 
 def _with_plain_names(settings: InputSettings, packed: str, plain: str) -> InputSettings:
     """The settings, with the mappings of tables that name the packed file naming the plain one."""
-    fitting = find_mapping(packed, settings.csv)
-    if fitting is None:
-        return settings
-    return settings.model_copy(update={"csv": (fitting.model_copy(update={"match": plain}), *settings.csv)})
+    fitting = tuple(mapping.model_copy(update={"match": plain}) for mapping in find_mappings(packed, settings.csv))
+    return settings.model_copy(update={"csv": (*fitting, *settings.csv)}) if fitting else settings
 
 
 def _open_plain(name: str, head: bytes, settings: InputSettings) -> Log:
@@ -176,11 +176,18 @@ def _open_ros2(path: str, head: bytes, settings: InputSettings) -> Log | None:
 
 
 def _open_mapped(path: str, head: bytes, settings: InputSettings) -> Log | None:
-    mapping = find_mapping(path, settings.csv)
-    if mapping is None:
-        return None
+    mappings = find_mappings(path, settings.csv)
+    return _table(path, mappings, settings) if mappings else None
+
+
+def _open_table(path: str, head: bytes, settings: InputSettings) -> Log | None:
+    draft = draft_table(path, head)
+    return None if draft is None else _table(path, draft.mappings, settings, draft.lines)
+
+
+def _table(path: str, mappings: tuple[CsvMapping, ...], settings: InputSettings, drafts: tuple[str, ...] = ()) -> Log:
     leap = leap_seconds(settings.leap_seconds)
-    return TextLog(path, "csv", f"csv/{mapping.role}", lambda: read_mapped(path, mapping, settings.gps_week, leap))
+    return TableLog(path, {each.role: partial(read_mapped, path, each, settings.gps_week, leap) for each in mappings}, drafts)
 
 
 def _open_own(path: str, head: bytes, settings: InputSettings) -> Log | None:
@@ -284,5 +291,8 @@ FORMATS: tuple[Format, ...] = (
     Format("gpx", "GPX tracks", (".gpx",), _open_gpx),
     Format("sbet", "SBET trajectory of Applanix POSPac, as a reference", (".out", ".sbet"), _open_sbet),
     Format("tum", "TUM trajectory, as a reference", (".tum", ".txt"), _open_tum),
+    Format(
+        "table", "any table whose header names what it holds (navreplay init drafts its [[input.csv]])", (".csv",), _open_table
+    ),
 )
 """In the order in which they are tried."""

@@ -110,6 +110,7 @@ def draft_mappings(paths: Sequence[str | Path], settings: InputSettings, inspect
     served = {channel.role for channel in inspection.channels}
     lines: list[str] = []
     for log in open_logs(paths, settings):
+        lines += getattr(log, "drafts", ())
         unknown = tuple(channel for channel in log.channels() if _is_unknown(channel))
         tables = log.read(tuple(channel.name for channel in unknown)) if unknown else {}
         drafts = [draft_mapping(channel, tables[channel.name]) for channel in unknown if len(tables[channel.name].log_time_ns)]

@@ -19,6 +19,7 @@ from importers.roles.sources import Clock, Joined, Source, join_sources
 from importers.rows.clock import leap_seconds
 from importers.rows.log import Log, Table, local_path
 from importers.settings import InputSettings
+from importers.text.csv_mapping import unused_tables
 from navreplay.timeline import ChannelUse, LogError, Provenance, RangeSeries, SourceFile, Timeline, Trajectory
 
 __all__ = ["build_timeline", "describe_file", "load_timeline", "open_logs"]
@@ -97,7 +98,10 @@ def build_timeline(
         notes.append("the fixes themselves, before any is withheld, serve as the reference: not an independent one")
     files = tuple(describe_file(log) for log in {log.path: log for log in logs}.values())
     damage = (*(f"{log.path}: {note}" for log in logs for note in log.notes), *unreadable)
-    damage += tuple(unused_mappings(logs, settings.message))
+    damage += (
+        *unused_mappings(logs, settings.message),
+        *unused_tables([log.path for log in logs], settings.csv),
+    )
     provenance = Provenance(files, _complete(logs, uses), tuple(dict.fromkeys(notes)), damage, tuple(recognised.items()))
     return Timeline(
         imu=imu,

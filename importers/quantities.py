@@ -66,6 +66,10 @@ Quantity = Literal[
     "std_att_x",
     "std_att_y",
     "std_att_z",
+    "speed",
+    "course",
+    "std_h",
+    "std_vel",
     "status",
     "sat",
     "signal",
@@ -88,8 +92,9 @@ Quantity = Literal[
     "ionosphere_m",
     "troposphere_m",
 ]
-"""What a column of a text file can hold. ``yaw`` is clockwise from north; ``q_*`` is the quaternion body (FRD) to NED, or
-to the frame that ``input.attitude`` names, ``std_att_*`` the standard deviations about the axes of that frame. Of
+"""What a column of a text file can hold. ``speed`` and ``course`` (clockwise from north) are over ground; ``std_h`` stands for
+both horizontal axes, ``std_vel`` for all of a velocity; ``yaw`` is clockwise from north; ``q_*`` is the quaternion body (FRD)
+to NED, or to the frame that ``input.attitude`` names, ``std_att_*`` the standard deviations about the axes of that frame. Of
 ranges, ``sat_clock_*`` and ``relativity_m`` are added to the pseudorange, ``group_delay_m``, ``ionosphere_m`` and
 ``troposphere_m`` (delays) are subtracted from it."""
 
@@ -98,13 +103,9 @@ _ALONG = {"f": (1, 0, 0), "b": (-1, 0, 0), "r": (0, 1, 0), "l": (0, -1, 0), "d":
 MessageQuantity = (
     Quantity
     | Literal[
-        "speed",
-        "course",
         "east",
         "north",
         "up",
-        "std_h",
-        "std_vel",
         "var_n",
         "var_e",
         "var_d",
@@ -116,10 +117,8 @@ MessageQuantity = (
         "height_plus",
     ]
 )
-"""What a field of a message can hold, besides: ``speed`` and ``course`` (clockwise from north) over ground; ``east``,
-``north``, ``up`` of ``origin_deg_m``; one standard deviation for both horizontal axes, or for all of a velocity;
-variances; and what is added to latitude, longitude and height (finer digits, the geoid separation of a height above mean
-sea level)."""
+"""What a field of a message can hold, besides: ``east``, ``north``, ``up`` of ``origin_deg_m``; variances; and what is added to
+latitude, longitude and height (finer digits, the geoid separation of a height above mean sea level)."""
 
 
 class Settings(BaseModel):

@@ -23,6 +23,7 @@ from importers.quantities import (
     TimeBase,
     Vector,
     check_axes,
+    unit_factor,
 )
 
 __all__ = [
@@ -161,20 +162,25 @@ class CsvTime(Settings):
     """Where the time of a row stands. base: ``gps`` counts from 1980-01-06, ``gps_unix`` from 1970 without leap seconds (as
     RTKLIB does), ``gps_tow`` from the start of the GPS week (week_column, or ``gps_week`` of the input), ``utc`` and ``tai``
     from 1970, ``boot`` from an unknown zero (see `ImuInput`); ``datetime_*`` is a date and time of day, in one column or
-    several."""
+    several. unit: ``auto`` goes by the size of the counts. day_first: whether 05/04/2023 is a day of April; None decides by the
+    whole column, and refuses where that leaves both."""
 
     column: Column | tuple[Column, ...]
-    unit: Literal["s", "ms", "us", "ns"] = "s"
+    unit: Literal["auto", "s", "ms", "us", "ns"] = "auto"
     base: Literal["gps", "gps_unix", "gps_tow", "utc", "tai", "boot", "datetime_utc", "datetime_gps"] = "gps"
     week_column: Column | None = None
+    day_first: bool | None = None
 
 
 class CsvMapping(Settings):
     """Meaning of a text file (or of a matrix in a MATLAB file) without a layout of its own.
 
     match: pattern of the file's name. columns: by quantity, the name or the number (from 1) of its column. status: by the
-    text of a status column, the kind of fix. variable: name of the matrix in a MATLAB file. corrections: of ranges, see
-    `RangeCorrections`. satellite_blocks: where satellites are mere numbers, the first number of each system."""
+    text of a status column, the kind of fix. angle_unit: of latitude and longitude ``auto`` goes by their size, of all other
+    angles it means degrees; ``ddmm`` are degrees and minutes written together. units: by quantity (or ``gyro``, ``accel``,
+    ``vel`` for all of a kind) another unit than SI, such as ``km/h``, ``ft``, ``1e-7 deg``. variable: name of the matrix in a
+    MATLAB file. corrections: of ranges, see `RangeCorrections`. satellite_blocks: where satellites are mere numbers, the first
+    number of each system."""
 
     match: str
     role: Literal["imu", "fix", "velocity", "attitude", "reference", "range"]
@@ -184,11 +190,19 @@ class CsvMapping(Settings):
     header: Literal["auto"] | bool = "auto"
     skip_rows: int = Field(default=0, ge=0)
     comment: Annotated[str, Field(min_length=1, max_length=1)] | None = None
-    angle_unit: Literal["deg", "rad"] = "deg"
+    angle_unit: Literal["auto", "deg", "rad", "ddmm"] = "auto"
+    units: dict[str, str] = Field(default_factory=dict)
     status: dict[str, StatusName] = Field(default_factory=dict)
     variable: str | None = None
     corrections: RangeCorrections = RangeCorrections()
     satellite_blocks: dict[System, Annotated[int, Field(ge=1)]] = Field(default_factory=dict)
+
+    @field_validator("units")
+    @classmethod
+    def _check_units(cls, units: dict[str, str]) -> dict[str, str]:
+        for text in units.values():
+            unit_factor(text)
+        return units
 
 
 class InputSettings(Settings):

@@ -75,7 +75,7 @@ def join_sources(
         rows.append(extracted)
         if told:
             notes.append(f"{source.channel.name}: {told}")
-        notes += [f"{source.channel.name}: {note}" for note in (kind.note, source.channel.note) if note]
+        notes += [f"{source.channel.name}: {note}" for note in (kind.note, source.channel.note, *source.table.notes) if note]
     ends = np.cumsum([len(times) for times, _ in timed])
     parts = tuple(slice(int(end - len(times)), int(end)) for end, (times, _) in zip(ends, timed, strict=True))
     t_ns = np.concatenate([times for times, _ in timed])

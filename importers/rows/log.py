@@ -39,12 +39,14 @@ class Table:
     covariances (n, 9) or (n, 36) row-major; strings an object column. Nested fields keep their dots
     (``pose.pose.position``, ``twist.twist.linear``, ``status.status``).
     read: messages found in the file. rejected: messages that could not be decoded, count per reason; read = n + rejected.
+    notes: sentences on what was recognised while reading.
     """
 
     log_time_ns: Times
     columns: Mapping[str, np.ndarray]
     read: int
     rejected: Mapping[str, int] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
 
 class Log(Protocol):

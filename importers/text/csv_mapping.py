@@ -1,24 +1,30 @@
 """Text files and MATLAB matrices whose columns the configuration names (``[[input.csv]]``)."""
 
+from collections.abc import Sequence
 from fnmatch import fnmatch
 from pathlib import Path
 
 import numpy as np
 
-from importers.rows.clock import count_ns, gps_from_gps_unix, is_time, unwrap_weeks
+from importers.rows.clock import gps_from_gps_unix
 from importers.rows.log import Table
 from importers.rows.tables import NO_FIX, diagonal_covariance, drop_absurd, status_codes
 from importers.settings import Column, CsvMapping, CsvTime
 from importers.text.csv_ranges import range_columns
-from importers.text.table import Selection, TextTable, parse_text, read_bytes, select_columns
+from importers.text.csv_units import in_si
+from importers.text.table import Selection, TextTable, head_cells, parse_text, read_bytes, select_columns
+from importers.text.times import check_rounding, read_counts, read_dates
 from navreplay.geodesy.earth import lla_from_ecef
 from navreplay.geodesy.rotation import quat_from_euler
-from navreplay.geodesy.time_scales import LeapSeconds, gps_from_tai, gps_from_utc, gps_from_week_tow
+from navreplay.geodesy.time_scales import LeapSeconds, gps_from_utc
 from navreplay.timeline import FixStatus, LogError, Times
 
-__all__ = ["find_mapping", "read_mapped"]
+__all__ = ["find_mappings", "read_mapped", "unused_tables"]
 
-_UNIT_S = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_LEAST_NS = 1e17
+_FASTEST_S = 0.11
+"""Rows further apart are those of a receiver, whose repeats mean something else."""
+_LEAST_REPEATS = 30
 _STATUS = {"none": NO_FIX} | {status.name.lower(): int(status) for status in FixStatus}
 _TEXTS = ("status", "sat", "signal")
 _GROUPS = {
@@ -44,9 +50,29 @@ _NEEDED = {
 }
 
 
-def find_mapping(path: str, mappings: tuple[CsvMapping, ...]) -> CsvMapping | None:
-    """The first mapping whose pattern the file's name fits."""
-    return next((mapping for mapping in mappings if fnmatch(Path(path).name, mapping.match)), None)
+def find_mappings(path: str, mappings: tuple[CsvMapping, ...]) -> tuple[CsvMapping, ...]:
+    """The first mapping whose pattern the file's name fits, and those for other roles that name the same file or pattern."""
+    name = Path(path).name
+    fitting = [mapping for mapping in mappings if fnmatch(name, mapping.match)]
+    found: dict[str, CsvMapping] = {}
+    for mapping in fitting:
+        if mapping.match in (fitting[0].match, name):
+            found.setdefault(mapping.role, mapping)
+    return tuple(found.values())
+
+
+def unused_tables(paths: Sequence[str], mappings: tuple[CsvMapping, ...]) -> list[str]:
+    """Sentences on mappings of the configuration that no file takes."""
+    names = [spelt for path in paths for spelt in (Path(path).name, Path(path).stem)]
+    used = [mapping for name in names for mapping in find_mappings(name, mappings)]
+    told = []
+    for mapping in mappings:
+        if any(mapping is other for other in used):
+            continue
+        fits = next((name for name in names if fnmatch(name, mapping.match)), None)
+        why = f"fits no file; there is {', '.join(names[::2])}" if fits is None else f"comes behind another that {fits} takes"
+        told.append(f"the mapping [[input.csv]] for '{mapping.match}' with the role {mapping.role} is not used: it {why}")
+    return told
 
 
 def read_mapped(path: str, mapping: CsvMapping, gps_week: int | None, leap: LeapSeconds) -> Table:
@@ -61,16 +87,50 @@ def read_mapped(path: str, mapping: CsvMapping, gps_week: int | None, leap: Leap
     (texts if dated else numbers).update(times)
     if mapping.time.week_column is not None:
         numbers["week"] = _find_column(text, mapping.time.week_column, place)
-    counted = list(times) if not dated and mapping.time.unit == "ns" and mapping.variable is None else []
+    if not dated and mapping.variable is None:
+        check_rounding(head_cells(text, next(iter(times.values()))), mapping.time.unit, place)
+    counted = list(times) if not dated and mapping.variable is None and _counts_ns(text, times, mapping.time) else []
     selection = select_columns(text, numbers, texts, counted)
     if selection.read == 0:
         raise LogError(f"{path}: the file holds no rows")
     t_ns, timed = _read_times(selection, mapping.time, gps_week, leap, place)
-    out = _build_columns(selection, mapping, timed, place)
+    out, notes = _build_columns(selection, mapping, timed, place)
     rejected = dict(selection.rejected)
     if not timed.all():
         rejected["no time"] = int((~timed).sum())
-    return Table(t_ns, out | {"t_gps_ns": t_ns}, selection.read, rejected)
+    table = Table(t_ns, out | {"t_gps_ns": t_ns}, selection.read, rejected, notes)
+    return _changes(table) if mapping.role == "fix" else table
+
+
+def _counts_ns(text: TextTable, times: dict[str, int], time: CsvTime) -> bool:
+    """Whether times count nanoseconds, which doubles would round."""
+    if time.unit != "auto" or text.frame.empty:
+        return time.unit == "ns"
+    import pandas as pd
+
+    return all(bool(pd.to_numeric(text.frame[i], errors="coerce").abs().median() > _LEAST_NS) for i in times.values())
+
+
+def _changes(table: Table) -> Table:
+    """The fixes where they change, of a table whose rows repeat each until the next, as those that hold an IMU do."""
+    n = len(table.log_time_ns)
+    values = {key: table.columns[key] for key in ("lla", "vel_n", "vel_ecef") if key in table.columns}
+    if n < _LEAST_REPEATS or "lla" not in values:
+        return table
+    whole = np.nan_to_num(np.column_stack([value.reshape(n, -1) for value in values.values()]), nan=-1.0)
+    fresh = np.concatenate([[True], (whole[1:] != whole[:-1]).any(axis=1)])
+    known = np.isfinite(values["lla"][:, :2]).all(axis=1)
+    interval = float(np.median(np.diff(table.log_time_ns))) / 1e9
+    runs = np.diff(np.flatnonzero(np.append(fresh & known, True)))
+    if interval > _FASTEST_S or len(runs) < 3 or np.median(runs) < 3:
+        return table
+    kept = fresh & known
+    rejected = dict(table.rejected)
+    rejected |= {"repeats the fix before it": int((~fresh & known).sum())} if (~fresh & known).any() else {}
+    rejected |= {"no fix in the row": int((~known).sum())} if (~known).any() else {}
+    columns = {name: column[kept] for name, column in table.columns.items()}
+    note = f"its rows repeat each fix until the next; of {n} the {int(kept.sum())} count where it changes"
+    return Table(table.log_time_ns[kept], columns, table.read, rejected, (*table.notes, note))
 
 
 def _read_lines(path: str, mapping: CsvMapping) -> TextTable:
@@ -96,10 +156,10 @@ def _read_matrix(path: str, mapping: CsvMapping) -> TextTable:
 def _find_column(text: TextTable, column: Column, place: str) -> int:
     width = text.frame.shape[1]
     if isinstance(column, str):
-        if column not in text.names:
+        place_in_line = _named(text.names, column)
+        if place_in_line is None:
             there = ", ".join(text.names) or f"{width} columns without names"
             raise LogError(f"{place} names the column '{column}', but the file has {there}")
-        place_in_line = text.names.index(column)
         if place_in_line >= width and not text.frame.empty:
             raise LogError(f"{place} names the column '{column}', but most lines of the file have only {width} fields")
         return place_in_line
@@ -108,40 +168,34 @@ def _find_column(text: TextTable, column: Column, place: str) -> int:
     return column - 1
 
 
+def _named(names: tuple[str, ...], column: str) -> int | None:
+    """The column of a name, with or without the mark of a comment before it or quotes about it."""
+    for spelt in (list(names), [name.strip("#% \"'") for name in names]):
+        for wanted in (column, column.strip("#% \"'")):
+            if wanted in spelt:
+                return spelt.index(wanted)
+    return None
+
+
 def _read_times(
     selection: Selection, time: CsvTime, gps_week: int | None, leap: LeapSeconds, place: str
 ) -> tuple[Times, np.ndarray]:
     """GPS time of the rows that have one, and which these are."""
     parts = [selection.columns[name] for name in selection.columns if name.startswith("time ")]
-    if time.base.startswith("datetime"):
-        import pandas as pd
-
-        joined = pd.Series(parts[0] if len(parts) == 1 else [" ".join(pieces) for pieces in zip(*parts, strict=True)])
-        stamps = pd.to_datetime(joined, format="mixed", errors="coerce", utc=True)
-        timed = stamps.notna().to_numpy()
-        unix_ns = stamps[timed].dt.tz_localize(None).to_numpy().astype("datetime64[ns]").astype(np.int64)
-        return (gps_from_utc(unix_ns, leap) if time.base == "datetime_utc" else gps_from_gps_unix(unix_ns)), timed
-    timed = is_time(parts[0], time.unit)
-    if "week" in selection.columns:
-        timed &= is_time(selection.columns["week"])
-    count = parts[0][timed]
-    if time.base == "gps_tow":
-        tow_s = count * _UNIT_S[time.unit]
-        stated = selection.columns.get("week")
-        week = unwrap_weeks(gps_week, tow_s, place) if stated is None else stated[timed].astype(np.int64)
-        return gps_from_week_tow(week, tow_s), timed
-    ns = count_ns(count, time.unit)
-    if time.base in ("gps", "boot"):
-        return ns, timed
-    if time.base == "gps_unix":
-        return gps_from_gps_unix(ns), timed
-    return (gps_from_utc(ns, leap) if time.base == "utc" else gps_from_tai(ns)), timed
+    if not time.base.startswith("datetime"):
+        return read_counts(parts[0], selection.columns.get("week"), time, gps_week, leap, place)
+    joined = parts[0] if len(parts) == 1 else np.array([" ".join(pieces) for pieces in zip(*parts, strict=True)], dtype=object)
+    unix_ns, timed = read_dates(joined, time.day_first, place)
+    return (gps_from_utc(unix_ns, leap) if time.base == "datetime_utc" else gps_from_gps_unix(unix_ns)), timed
 
 
-def _build_columns(selection: Selection, mapping: CsvMapping, timed: np.ndarray, place: str) -> dict[str, np.ndarray]:
+def _build_columns(
+    selection: Selection, mapping: CsvMapping, timed: np.ndarray, place: str
+) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
     columns = {name: values[timed] for name, values in selection.columns.items()}
     if mapping.role == "range":
-        return range_columns(columns, mapping, place)
+        return range_columns(columns, mapping, place), ()
+    columns, notes = in_si(columns, mapping)
     out: dict[str, np.ndarray] = {
         key: drop_absurd(np.column_stack([columns[name] for name in names]).astype(np.float64))
         for key, names in _GROUPS.items()
@@ -153,21 +207,16 @@ def _build_columns(selection: Selection, mapping: CsvMapping, timed: np.ndarray,
     if not any(out.keys() >= set(keys) for keys in _NEEDED[mapping.role]):
         wanted = " or ".join(", ".join(_GROUPS.get(key, (key,))) for keys in _NEEDED[mapping.role] for key in keys)
         raise LogError(f"{place} has the role {mapping.role}, which needs the columns {wanted}")
-    angle = np.pi / 180 if mapping.angle_unit == "deg" else 1.0
-    if "lla" in out:
-        out["lla"] = out["lla"] * [angle, angle, 1.0]
     if "ecef" in out:
         out["lla"] = lla_from_ecef(out.pop("ecef"))
     if "vel_neu" in out:
         out["vel_n"] = out.pop("vel_neu") * [1.0, 1.0, -1.0]
     if "euler" in out:
-        out["q_nb"] = quat_from_euler(*(out.pop("euler") * angle).T)
-    if "std_att" in out:
-        out["std_att"] = out["std_att"] * angle
+        out["q_nb"] = quat_from_euler(*out.pop("euler").T)
     for key, cov in (("std_pos", "cov_pos"), ("std_vel", "cov_vel"), ("std_att", "cov_att")):
         if key in out:
             out[cov] = diagonal_covariance(out.pop(key))
     if "status" in columns:
         out["status"] = status_codes(columns["status"], {text: _STATUS[kind] for text, kind in mapping.status.items()})
     out.pop("yaw", None)
-    return out
+    return out, notes

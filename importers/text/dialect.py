@@ -13,7 +13,29 @@ _MASKS = {",": 0x1C, ";": 0x1D, "\t": 0x1E, " ": 0x1F}
 _UNMASKED = {code: mark for mark, code in _MASKS.items()}
 _WITH_COMMA = re.compile(r"[+-]?\d+[,\x1c]\d+([eE][+-]?\d+)?")
 _WITH_POINT = re.compile(r"[+-]?\d*\.\d+([eE][+-]?\d+)?")
-_UNITS = frozenset("s ms us ns deg rad m m/s m/s2 m/s^2 rad/s deg/s g - mm km/h kn hz % counts".split())
+_UNITS = frozenset(
+    [
+        "s",
+        "ms",
+        "us",
+        "ns",
+        "deg",
+        "rad",
+        "m",
+        "mm",
+        "m/s",
+        "m/s2",
+        "m/s^2",
+        "rad/s",
+        "deg/s",
+        "g",
+        "km/h",
+        "kn",
+        "hz",
+        "%",
+        "-",
+    ]
+)
 
 
 def mask_quoted(data: bytes, marks: str = ",;\t") -> bytes:
@@ -66,14 +88,14 @@ def guess_delimiter(head: Sequence[str]) -> str:
 
 def _is_spaced(line: str) -> bool:
     """Whether white space divides numbers with decimal commas."""
-    fields = line.split()
+    fields = split_fields(line, " ")
     numbers = [field for field in fields if _WITH_COMMA.fullmatch(field)]
     return len(fields) > 1 and 2 * len(numbers) > len(fields)
 
 
 def split_fields(line: str, delimiter: str) -> list[str]:
     """Fields of one line."""
-    return line.split() if delimiter == " " else line.rstrip("\r").split(delimiter)
+    return re.findall(r"[^ \t\r]+", line) if delimiter == " " else line.rstrip("\r").split(delimiter)
 
 
 def decimal_comma(head: Sequence[str], delimiter: str) -> bytes:
@@ -110,7 +132,7 @@ def _behind_notes(head: Sequence[str], delimiter: str) -> tuple[tuple[str, ...],
 
 
 def _names(line: str, delimiter: str) -> tuple[str, ...]:
-    fields = line.lstrip("#% ").split() if delimiter == " " and line[:1] in "#%" else split_fields(line, delimiter)
+    fields = split_fields(line.lstrip("#% "), " ") if delimiter == " " and line[:1] in "#%" else split_fields(line, delimiter)
     return tuple(unmask(field).strip() for field in fields)
 
 

@@ -5,8 +5,10 @@ Functions of the readers of texts import pandas themselves: it takes half a seco
 """
 
 import csv
+import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,19 +16,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from importers.text.dialect import decimal_comma, find_header, guess_delimiter, mask_quoted, unmask
+from importers.text.dialect import decimal_comma, find_header, guess_delimiter, mask_quoted, split_fields, unmask
 from importers.text.unix_compress import is_compressed, unpack
 from navreplay.timeline import LogError
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Selection", "TextTable", "parse_text", "read_bytes", "select_columns"]
+__all__ = ["Selection", "TextTable", "head_cells", "parse_text", "read_bytes", "select_columns"]
 
 _NEWLINE = 10
 _LAST_BLANK = 32
 _HEAD_LINES = 50
 _INT64 = r"[+-]?(\d{1,18}|[1-8]\d{18})"
+
+
+_LARGEST = 9 * 10**18
+_WRITTEN_AS_REAL = re.compile(r"[+-]?\d{1,19}\.0*|[+-]?\d(\.\d*)?[eE]\+?1\d")
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -133,6 +139,13 @@ def select_columns(
     return Selection(columns, table.read, rejected)
 
 
+def head_cells(table: TextTable, index: int) -> list[str]:
+    """The first cells of a column as they stand in the file."""
+    lines = table.lines.split(b"\n", _HEAD_LINES)[:_HEAD_LINES]
+    cells = [split_fields(line.decode(errors="replace"), table.delimiter) for line in lines]
+    return [unmask(row[index].strip()) for row in cells if len(row) > index]
+
+
 def _to_numbers(column: "pd.Series", whole: bool) -> np.ndarray:
     import pandas as pd
 
@@ -148,8 +161,14 @@ def _with_integers(table: TextTable, indices: Sequence[int]) -> "pd.DataFrame":
         return table.frame
     texts = _parse_lines(table.lines, table.delimiter, table.frame.shape[1], as_text=True)
     cells = {index: texts[index].str.strip() for index in rounded}
-    whole = {index: cell.where(cell.str.fullmatch(_INT64), "x") for index, cell in cells.items()}
+    whole = {index: cell.where(cell.str.fullmatch(_INT64), cell.map(_whole)) for index, cell in cells.items()}
     return table.frame.drop(columns=rounded).join(type(table.frame)(whole))
+
+
+def _whole(cell: str) -> str:
+    """A count that is written with a point or an exponent, as one without; ``x`` for another text."""
+    match = _WRITTEN_AS_REAL.fullmatch(cell)
+    return str(int(Decimal(cell))) if match and abs(Decimal(cell)) < _LARGEST else "x"
 
 
 def _split_lines(buffer: NDArray[np.uint8], skip_rows: int, comment: str | None) -> tuple[np.ndarray, np.ndarray]:

@@ -20,7 +20,7 @@ def run(arguments: argparse.Namespace) -> None:
     inspection = inspect_logs(arguments.logs, settings)
     config = load_config(arguments.config, [*_found(inspection), *arguments.sets])
     drafts = draft_mappings(arguments.logs, settings, inspection)
-    if config.input.message:  # written out above, and no table of TOML is told twice
+    if config.input.message or config.input.csv:  # written out above, and no table of TOML is told twice
         drafts = [f"# {line}".rstrip() for line in drafts]
     text = commented_template(config, _notes(inspection)) + "".join(f"{line}\n" for line in drafts)
     try:

@@ -121,8 +121,8 @@ def _describe_key(path: str, key: str, value: object, field: FieldInfo) -> Itera
     example = _EXAMPLES.get(f"{path}.{key}", _EXAMPLES.get(key))
     text = field.description or _INPUT.get(f"{path}.{key}") or _INPUT.get(key)
     comment = f" # {text}" if text else ""
-    if key == "message" and not value:
-        yield f"# {key} = []{comment}"  # an array written here could not be added to by [[input.message]] below
+    if key in ("csv", "message") and not value:
+        yield f"# {key} = []{comment}"  # an array written here could not be added to by tables below
     elif value is not None:
         yield f"{key} = {_inline(value)}{comment}"
     elif example is not None:

@@ -1,0 +1,183 @@
+"""Tables whose header tells what they hold: mappings for them, drafted from names, units and the first rows."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fnmatch import translate
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomlkit
+
+from importers.rows.field_names import Guess, guess_angle_unit, guess_quantities, guess_time, unit_in
+from importers.settings import CsvMapping
+from importers.text.table import TextTable, head_cells, parse_text
+from navreplay.timeline import Floats, LogError
+
+__all__ = ["TableDraft", "draft_table"]
+
+_ROLES: tuple[tuple[str, frozenset[str]], ...] = (
+    ("imu", frozenset(f"{kind}_{axis}" for kind in ("gyro", "accel") for axis in "xyz")),
+    ("fix", frozenset({"lat", "lon"})),
+)
+_OF_A_FIX = ("height", "vel_n", "vel_e", "vel_d", "vel_u", "speed", "course", "std_h", "std_d", "std_n", "std_e")
+_DATED = re.compile(
+    r"\s*\"?(\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.]\d{2,4}|\d{8})(?P<clock>[\sT]+\d{1,2}:?\d\d.*)?\"?\s*"
+)
+_CLOCK = re.compile(r"\s*\d{1,2}:\d\d:\d\d(?:[.,]\d*)?\s*(Z|UTC|[AaPp]\.?[Mm]\.?)?\s*")
+_TIMES_OF_DAY = re.compile(r".*(time|utc|clock).*")
+_HEAD_ROWS = 20
+_NOT_SI = {"gyro": "rad/s", "accel": "m/s2", "vel": "m/s", "speed": "m/s", "height": "m", "std": "m", "course": "deg"}
+
+
+@dataclass(frozen=True, slots=True)
+class TableDraft:
+    """mappings: one for each role that the table can serve. lines: the same in TOML, a key a line, with reasons."""
+
+    mappings: tuple[CsvMapping, ...]
+    lines: tuple[str, ...]
+
+
+def draft_table(path: str, head: bytes) -> TableDraft | None:
+    """Mappings for a table by its header and the rows of its head; None where the header tells no role. Raises LogError where
+    it does, but no time is understood."""
+    if b"\x00" in head[:1000] and head[:2] not in (b"\xff\xfe", b"\xfe\xff"):
+        return None
+    text = head.decode("utf-16" if head[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig", errors="replace")
+    table = parse_text(text.rpartition("\n")[0].encode())
+    if not table.names or len(table.frame) == 0:
+        return None
+    fields = _numbers(table)
+    guesses = guess_quantities(fields)
+    roles = [(role, needed) for role, needed in _ROLES if guesses.keys() >= needed]
+    if not roles:
+        return None
+    time = _time(table, fields)
+    if time is None:
+        held = ", ".join(f"{guesses[name].path}" for name in sorted(roles[0][1]))
+        first = ", ".join(f"{name} = {cell}" for name, cell in zip(table.names, _first_row(table), strict=False))
+        raise LogError(
+            f"{path}: a table that could serve as {roles[0][0]} ({held}), but no column is understood as its time (first row: "
+            f"{first[:200]}); name it with time.column and time.base of an [[input.csv]]"
+        )
+    drafts = [_mapping(path, role, needed, guesses, fields, time) for role, needed in roles]
+    mappings = tuple(CsvMapping.model_validate(values) for values, _ in drafts)
+    return TableDraft(mappings, tuple(line for values, reasons in drafts for line in _toml(values, reasons)))
+
+
+def _first_row(table: TextTable) -> list[str]:
+    return [next(iter(head_cells(table, i)), "") for i in range(table.frame.shape[1])]
+
+
+def _numbers(table: TextTable) -> dict[str, Floats]:
+    """Columns (n,) of numbers by the name of each, of those that hold any."""
+    fields = {}
+    for i, name in enumerate(table.names[: table.frame.shape[1]]):
+        column = table.frame[i]
+        if column.dtype.kind in "fiu" and column.notna().any() and name not in fields:
+            fields[name] = column.to_numpy(dtype=np.float64)
+    return fields
+
+
+def _time(table: TextTable, fields: Mapping[str, Floats]) -> tuple[dict[str, Any], str] | None:
+    """The time of a mapping, and why."""
+    return _week_and_tow(fields) or _count(fields) or _date(table)
+
+
+def _week_and_tow(fields: Mapping[str, Floats]) -> tuple[dict[str, Any], str] | None:
+    plain = {name: re.sub(r"[^a-z]", "", name.lower()) for name in fields}
+    week = next(
+        (name for name, word in plain.items() if re.fullmatch(r"(gps|gnss)?(week|wn|weekno|weeknumber|wnc)", word)), None
+    )
+    named = r".*(tow|sow|timeofweek|secondsofweek|secofweek|gpsseconds?|gpssec|weekseconds?|weeksec|weekms|itow).*"
+    second = next((name for name, word in plain.items() if re.fullmatch(named, word)), None)
+    if week is None or second is None:
+        return None
+    return {"column": second, "base": "gps_tow", "week_column": week}, f"{week} is a GPS week, {second} the time in it"
+
+
+def _count(fields: Mapping[str, Floats]) -> tuple[dict[str, Any], str] | None:
+    found = guess_time(fields)
+    if found is None:
+        return None
+    column, unit, base, reason = found
+    return {"column": column, "unit": unit, "base": base}, reason
+
+
+def _date(table: TextTable) -> tuple[dict[str, Any], str] | None:
+    """A column of dates with times of day, or one of dates and one of times of day."""
+    cells = {name: head_cells(table, i)[:_HEAD_ROWS] for i, name in enumerate(table.names[: table.frame.shape[1]])}
+    dates = {name: _DATED.fullmatch(own[0]) for name, own in cells.items() if own}
+    whole = next((name for name, match in dates.items() if match is not None and match.group("clock")), None)
+    base = f"datetime_{'gps' if whole and 'gps' in whole.lower() else 'utc'}"
+    if whole is not None:
+        return {"column": whole, "base": base}, f"a date and time of day, as {cells[whole][0]}"
+    day = next(
+        (name for name, match in dates.items() if match is not None and re.search(r"date|day|dmy|ymd", name.lower())), None
+    )
+    clock = next((name for name, own in cells.items() if own and all(_CLOCK.fullmatch(cell) for cell in own if cell)), None)
+    if day is None or clock is None or not _TIMES_OF_DAY.fullmatch(clock.lower()):
+        return None
+    return {"column": (day, clock), "base": base}, f"a date and a time of day, as {cells[day][0]} {cells[clock][0]}"
+
+
+def _mapping(
+    path: str,
+    role: str,
+    needed: frozenset[str],
+    guesses: Mapping[str, Guess],
+    fields: Mapping[str, Floats],
+    time: tuple[dict[str, Any], str],
+) -> tuple[dict[str, Any], dict[str, str]]:
+    """A mapping for one role, and the reasons of its keys."""
+    wanted = [name for name in guesses if name in needed or (role == "fix" and name in _OF_A_FIX)]
+    if "course" not in wanted or "vel_n" in wanted:
+        wanted = [name for name in wanted if name not in ("speed", "course")]
+    if "vel_d" in wanted and "vel_u" in wanted:
+        wanted.remove("vel_u")
+    values: dict[str, Any] = {"match": _literal(Path(path).name), "role": role, "time": time[0]}
+    values["columns"] = {name: guesses[name].path for name in wanted}
+    units = {name: unit_in(guesses[name].path) for name in wanted if unit_in(guesses[name].path)}
+    angles = {units.pop(name) for name in ("lat", "lon") if name in units}
+    values["units"] = {
+        name: unit for name, unit in units.items() if unit != _NOT_SI.get(name.partition("_")[0]) or role == "imu"
+    }
+    reasons = {"time": time[1], "role": f"its header has {', '.join(guesses[name].path for name in sorted(needed))}"}
+    if role == "fix":
+        guessed, why = guess_angle_unit(*(fields[guesses[name].path] for name in ("lat", "lon")))
+        told = next((unit for unit in angles if unit in ("deg", "rad")), None)
+        if told is not None:
+            values["angle_unit"], reasons["angle_unit"] = told, f"the header says {told}"
+        elif guessed in ("deg", "rad", "ddmm"):
+            values["angle_unit"], reasons["angle_unit"] = guessed, why
+        else:
+            values["units"] |= {"lat": guessed, "lon": guessed}
+    return values, reasons
+
+
+def _literal(name: str) -> str:
+    """A pattern that fits just this name."""
+    return name if re.fullmatch(translate(name), name) else "".join(f"[{c}]" if c in "[?*" else c for c in name)
+
+
+def _toml(values: Mapping[str, Any], reasons: Mapping[str, str]) -> list[str]:
+    lines = ["", "[[input.csv]] # drafted from the header and the first rows: check it"]
+    for key, value in values.items():
+        if not isinstance(value, dict):
+            lines.append(_line(key, value, reasons.get(key)))
+    for key, value in values.items():
+        if isinstance(value, dict) and value:
+            lines.append(f"[input.csv.{key}]" + (f" # {_plain(reasons[key])}" if key in reasons else ""))
+            lines += [_line(name, part, None) for name, part in value.items()]
+    return lines
+
+
+def _line(key: str, value: object, reason: str | None) -> str:
+    shown = tomlkit.item(list(value) if isinstance(value, tuple) else value).as_string()
+    return f"{key} = {shown}" + (f" # {_plain(reason)}" if reason else "")
+
+
+def _plain(reason: str) -> str:
+    """A reason that fits on a line of comment."""
+    return "".join(c if c.isprintable() else " " for c in reason)
