@@ -4,6 +4,7 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
+from datetime import datetime
 from importlib import import_module, metadata
 from pathlib import Path
 
@@ -163,6 +164,51 @@ def _add_formats(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
     _add_json(_add_command(commands, "formats", "list the log formats that are read, a line each"))
 
 
+def _add_batch(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    parser = _add_command(commands, "batch", "process an archive of drives, with a catalogue of all")
+    parser.add_argument("sources", metavar="SOURCE", nargs="+", help="folders, logs, patterns, or lists of them (.lst)")
+    parser.add_argument("-o", "--out", metavar="DEST", type=Path, required=True, help="folder for the results")
+    parser.add_argument("-c", "--config", metavar="FILE", type=Path, help="configuration in TOML for all drives")
+    parser.add_argument(
+        "--rules", metavar="FILE", type=Path, help="TOML with what the archive cannot tell: configurations, joins"
+    )
+    parser.add_argument("--filters", metavar="A,B,...", help="methods (default: that of the configuration)")
+    parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], dest="sets", help="override one key")
+    parser.add_argument("--workers", metavar="N", type=int, default=0, help="processes (default: one per core)")
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="a running Dask scheduler, or 'local' for a cluster here")
+    parser.add_argument("--resume", action="store_true", help="go on with a batch: only what is new or changed")
+    parser.add_argument("--retry-failed", action="store_true", help="the same, and what failed before")
+    parser.add_argument("--match", metavar="GLOB", default="*", help="only files of this pattern")
+    parser.add_argument("--since", metavar="TIME", type=datetime.fromisoformat, help="only files changed since then")
+    parser.add_argument("--until", metavar="TIME", type=datetime.fromisoformat, help="only files changed until then")
+    parser.add_argument("--dry-run", action="store_true", help="show the drives that were found, and why, and do nothing")
+    parser.add_argument("--quiet", action="store_true", help="no progress bar, no summary")
+    _add_json(parser)
+
+
+def _add_catalog(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    parser = _add_command(commands, "catalog", "search the catalogue of an archive, or open it in Rerun")
+    parser.add_argument("folder", metavar="DEST", type=Path, help="folder written by 'navreplay batch'")
+    parser.add_argument("--where", metavar="CONDITION", help='such as "horizontal_rms_m > 0.1 and distance_m > 1000"')
+    parser.add_argument("--sort", metavar="COLUMN", help="smallest first; -COLUMN: largest first (write --sort=-COLUMN)")
+    parser.add_argument("--columns", metavar="A,B,...", help="columns to show")
+    parser.add_argument("--format", choices=("table", "csv", "json", "parquet"), default="table", help="how to show them")
+    parser.add_argument("-o", "--out", metavar="FILE", type=Path, help="file for --format parquet")
+    parser.add_argument("--serve", action="store_true", help="serve the archive to the Rerun viewer")
+    parser.add_argument("--host", default="127.0.0.1", help="address to serve on (default: this machine alone)")
+    parser.add_argument("--port", type=int, default=51234, help="port to serve on")
+
+
+def _add_diff(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    parser = _add_command(commands, "diff", "show what changed between two reprocessings of an archive")
+    parser.add_argument("before", metavar="DEST_A", type=Path, help="folder written by 'navreplay batch'")
+    parser.add_argument("after", metavar="DEST_B", type=Path, help="another one, later")
+    parser.add_argument(
+        "--tolerance", metavar="M", type=float, default=0.01, help="exit 1 beyond this separation (default 0.01 m)"
+    )
+    _add_json(parser)
+
+
 _COMMANDS = (
     _add_inspect,
     _add_init,
@@ -171,6 +217,9 @@ _COMMANDS = (
     _add_synth,
     _add_experiment,
     _add_export,
+    _add_batch,
+    _add_catalog,
+    _add_diff,
     _add_filters,
     _add_formats,
 )

@@ -32,10 +32,11 @@ _LONGEST_NAMES = 60
 """Names of runs that a title holds [characters]."""
 
 
-def write_outputs(result: RunResult, out_dir: str | Path) -> dict[str, Path]:
+def write_outputs(result: RunResult, out_dir: str | Path, recording: str | None = None) -> dict[str, Path]:
     """Writes solution.csv, report.json, report.md, report.html, config.toml, config.estimated.toml where the method estimated
     noise from the whole log, launch.csv in the launch-inertial frame, and, unless the configuration says otherwise,
-    recording.rrd. Returns the paths by name. Raises LogError when the folder cannot be written."""
+    recording.rrd; recording: its identity, that of files and configuration where it is None (recordings of one identity are
+    layers of one segment in a catalogue). Returns the paths by name. Raises LogError when the folder cannot be written."""
     report = build_report(result)
     title, subtitle = _title(result)
     figures, tables, notice = headline_figures(report), report_tables(report), verdict_notice(report["verdict"])
@@ -57,7 +58,7 @@ def write_outputs(result: RunResult, out_dir: str | Path) -> dict[str, Path]:
     if result.config.output.recording:
         from pipelines.recording.view import write_recording  # loading rerun takes a second, and not every run records
 
-        writers["recording.rrd"] = lambda path: write_recording(path, result)
+        writers["recording.rrd"] = lambda path: write_recording(path, result, recording)
     return _write_files(Path(out_dir), writers)
 
 

@@ -44,12 +44,12 @@ def recording_id(result: RunResult) -> str:
     return digest.hexdigest()[:32]
 
 
-def write_recording(path: Path, result: RunResult) -> None:
-    """Writes the recording with its layout."""
+def write_recording(path: Path, result: RunResult, identity: str | None = None) -> None:
+    """Writes the recording with its layout. identity: of the recording, where it is not that of files and configuration."""
     solution = result.solution
     origin = solution.lla[0]
     track = _local(origin, solution.lla)
-    with rr.RecordingStream(_APPLICATION, recording_id=recording_id(result), send_properties=False) as recording:
+    with rr.RecordingStream(_APPLICATION, recording_id=identity or recording_id(result), send_properties=False) as recording:
         recording.set_log_time_enabled(False)
         recording.set_log_tick_enabled(False)
         recording.save(path, default_blueprint=_layout(result, track))
