@@ -13,6 +13,7 @@ from navreplay.timeline import Floats, GnssFixSeries, ImuSeries, Times
 __all__ = ["ForwardMatch", "YawMatch", "match_forward", "match_yaw"]
 
 _GRID_S = 0.02
+_LONGEST_S = 172_800.0
 _LONGEST_LAG_S = 25.0
 _SHORT_LAG_S = 3.0
 _MIN_SPEED = 2.0
@@ -95,11 +96,12 @@ def _up(imu: ImuSeries) -> Floats:
 
 
 def _grid_integral(imu: ImuSeries, signal: Floats) -> Floats:
-    """Integral of a signal (n,) over time, on an even grid from the first sample on."""
+    """Integral of a signal (n,) over time, on an even grid from the first sample on; not beyond two days, for one wrong
+    stamp may lie years ahead."""
     seconds = (imu.t_ns - imu.t_ns[0]) / 1e9
     steps = np.diff(seconds) * (signal[1:] if imu.increments else (signal[1:] + signal[:-1]) / 2)
     total = np.concatenate([[0.0], np.cumsum(steps)])
-    return np.asarray(np.interp(np.arange(0.0, seconds[-1] + _GRID_S, _GRID_S), seconds, total))
+    return np.asarray(np.interp(np.arange(0.0, min(seconds[-1], _LONGEST_S) + _GRID_S, _GRID_S), seconds, total))
 
 
 def _gnss_motion(imu: ImuSeries, fixes: GnssFixSeries) -> _Motion:

@@ -91,6 +91,14 @@ def test_leap_seconds_between_imu_and_gnss_are_an_error(offset_s):
     assert "UTC and GPS time" in finding.text
 
 
+def test_one_stamp_years_ahead_costs_neither_memory_nor_the_match():
+    imu = LOG.imu
+    t_ns = np.append(imu.t_ns, imu.t_ns[-1] + 5 * 365 * 86_400 * 10**9)
+    stray = replace(imu, t_ns=t_ns, gyro=np.vstack([imu.gyro, imu.gyro[-1:]]), accel=np.vstack([imu.accel, imu.accel[-1:]]))
+    match = match_yaw(stray, LOG.fixes)
+    assert match.offset_s == pytest.approx(match_yaw(imu, LOG.fixes).offset_s, abs=0.02)
+
+
 def test_without_turns_no_offset_is_claimed():
     still = with_imu(gyro=np.zeros_like(LOG.imu.gyro))
     assert "cannot be estimated" in find(still, "time-offset").text
