@@ -57,10 +57,11 @@ def build_layout(
     plots = rrb.Tabs(contents=[_arrange(stack, whole) for stack in stacks], active_tab=0, name="Plots")
     columns = [rrb.encodings.TextLogColumn(kind, visible=kind != "entitypath") for kind in ("entitypath", "loglevel", "body")]
     events = rrb.TextLogView(name="Events", origin="/events", columns=rrb.TextLogColumns(text_log_columns=columns))
+    verdict = rrb.TextDocumentView(name="Verdict", origin="/verdict")
     return rrb.Blueprint(
         rrb.Horizontal(
             rrb.Vertical(track, rrb.Horizontal(chart, *overhead), row_shares=[3, 2]),
-            rrb.Vertical(plots, events, row_shares=[4, 1]),
+            rrb.Vertical(plots, rrb.Horizontal(verdict, events), row_shares=[3, 1]),
             column_shares=[1, 1],
         ),
         rrb.TimePanel(state="collapsed", timeline="elapsed"),

@@ -1,6 +1,7 @@
 """recording.rrd: a run for the Rerun viewer, on the timelines ``elapsed`` (since the first row) and ``time`` (UTC)."""
 
 import hashlib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -46,7 +47,7 @@ def recording_id(result: RunResult) -> str:
 
 def write_recording(path: Path, result: RunResult, identity: str | None = None) -> None:
     """Writes the recording with its layout. identity: of the recording, where it is not that of files and configuration."""
-    solution = result.solution
+    solution, described = result.solution, describe_verdict(result)
     origin = solution.lla[0]
     track = _local(origin, solution.lla)
     with rr.RecordingStream(_APPLICATION, recording_id=identity or recording_id(result), send_properties=False) as recording:
@@ -54,8 +55,7 @@ def write_recording(path: Path, result: RunResult, identity: str | None = None) 
         recording.set_log_tick_enabled(False)
         recording.save(path, default_blueprint=_layout(result, track))
         recording.send_recording_name(f"{_APPLICATION}: {solution.method}")
-        described = describe_verdict(result)
-        recording.send_property("verdict", rr.AnyValues(grade=described["grade"], summary=described["summary"]))
+        _send_verdict(recording, described)
         _send_track(recording, solution, track)
         _send_reference_and_fixes(recording, result, origin)
         _send_outage_tracks(recording, result, track)
@@ -66,7 +66,7 @@ def write_recording(path: Path, result: RunResult, identity: str | None = None) 
         send_innovations(recording, solution)
         send_weights(recording, solution)
         send_biases(recording, solution)
-        _send_events(recording, result)
+        _send_events(recording, result, described)
         recording.flush()
         recording.disconnect()
 
@@ -158,12 +158,18 @@ def _send_ellipsoids(recording: rr.RecordingStream, solution: Solution, track: F
     recording.log("/local/ellipsoids", ellipsoids, static=True)
 
 
-def _send_events(recording: rr.RecordingStream, result: RunResult) -> None:
+def _send_verdict(recording: rr.RecordingStream, described: Mapping[str, Any]) -> None:
+    """As a property, which a catalogue shows as columns, and as a document beside the events."""
+    recording.send_property("verdict", rr.AnyValues(grade=described["grade"], summary=described["summary"]))
+    text = "\n".join([f"**Verdict: {described['summary']}**\n", *(f"- {line}" for line in described["lines"])])
+    recording.log("/verdict", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
+
+
+def _send_events(recording: rr.RecordingStream, result: RunResult, described: Mapping[str, Any]) -> None:
     solution = result.solution
     begin = int(solution.t_ns[0])
     # the cursor opens at the first time there is, and that should be one with something to see
-    described = describe_verdict(result)
-    rows = [(begin, _GRADE_LEVELS[described["grade"]], "\n".join([f"verdict: {described['summary']}", *described["lines"]]))]
+    rows = [(begin, _GRADE_LEVELS[described["grade"]], f"verdict: {described['summary']}")]
     rows += [(max(event.t_ns, begin), event.level, event.text) for event in solution.events]
     rows += [(begin, finding.level, finding.text) for finding in result.findings]
     for errors in outage_errors(result):

@@ -111,7 +111,7 @@ def _metres(value: float) -> str:
 
 
 def _fault_text(fault: Fault) -> str:
-    kind, times = fault.kind.replace("_", " "), f"{sqrt(max(fault.value, 0)):.2g} times"
+    kind, times = _plural(fault.kind), f"{sqrt(max(fault.value, 0)):.2g} times"
     return {
         "finite": f"{100 * fault.value:.3g} % of the rows are not finite",
         "rejected": f"{100 * fault.value:.0f} % of {kind} were rejected, and outliers do not explain it",
@@ -121,7 +121,7 @@ def _fault_text(fault: Fault) -> str:
         "far-windows": f"the fixes lie more than twice as far off as both covariances say in {_share(fault.value)}",
         "restarts": f"the filter lost its way and was started anew {_count(round(fault.value), 'time')}",
         "reference": f"against the reference the solution is {fault.value:.2g} times as far off as its fixes",
-        "told": f"{kind} accuracy is told too well in the log: {fault.value:.2g} times as much was taken",
+        "told": f"the log tells the accuracy of {kind} too well: {fault.value:.2g} times as much was taken",
         "backward": f"forward and smoothed positions differ {times} as much as they should",
         "outage": f"positions are missing for {fault.value:.0f} s in a row",
     }[fault.code]
@@ -137,7 +137,7 @@ def _count(number: int, word: str) -> str:
 
 def _lines(result: RunResult) -> list[str]:
     verdict = result.verdict
-    lines = [f"{fault.grade}: {_fault_text(fault)}" for fault in verdict.faults]
+    lines = [f"{fault.grade}: {_fault_text(fault)}" for fault in verdict.faults[1:]]  # the first is in the summary
     lines += [_kind_line(use) for use in verdict.kinds]
     median, p95 = verdict.accuracy
     calibrated = (
@@ -159,9 +159,9 @@ def _kind_line(use: KindUse) -> str:
     rejected = f", {use.rejected} rejected"
     if use.rejected:
         rejected += f" ({use.unexplained} not explained by outliers; {use.reason})"
-    nis = f"; innovation square {figure_text(use.nis)} of the expected one (median)" if isfinite(use.nis) else ""
+    nis = f"; their squared innovations are {figure_text(use.nis)} of what is expected (median)" if isfinite(use.nis) else ""
     off = f", too large in {use.windows_off} of {use.windows} windows of 30 s" if use.windows else ""
-    return f"{use.kind.replace('_', ' ')}: {use.read} read, {use.used} used{rejected if use.rejected else ''}{nis}{off}"
+    return f"{_plural(use.kind)}: {use.read} read, {use.used} used{rejected if use.rejected else ''}{nis}{off}"
 
 
 def _fix_lines(verdict: Verdict) -> list[str]:
@@ -169,7 +169,7 @@ def _fix_lines(verdict: Verdict) -> list[str]:
     near, errors = verdict.closeness, verdict.fix_errors
     if near is not None:
         lines.append(
-            f"fixes: {_metres(near.median)} from the solution (median; 95 % {_metres(near.p95)}), a square "
+            f"distance of fixes to the solution: {_metres(near.median)} median, {_metres(near.p95)} 95 %; squared "
             f"{figure_text(near.square if isfinite(near.square) else None)} of what both covariances say"
         )
     if errors is not None and errors.own:
@@ -185,17 +185,37 @@ def _fix_lines(verdict: Verdict) -> list[str]:
 def _backward_line(verdict: Verdict) -> str:
     if verdict.backward is None:
         return "forward only: no backward pass to compare with (--smooth makes one)"
-    return f"forward against smoothed positions: a square {figure_text(verdict.backward)} of the expected one (median)"
+    return (
+        f"forward against smoothed positions: squared differences {figure_text(verdict.backward)} of what is expected (median)"
+    )
 
 
 def _limit(result: RunResult) -> str:
-    """What holds the run back most."""
+    """What holds the run back most, as far as it can be told."""
     verdict = result.verdict
     if verdict.faults:
-        return _fault_text(verdict.faults[0])
+        return _cause(verdict.faults[0])
     if verdict.outages[1] > _LONG_OUTAGE_S:
         return f"a stretch of {verdict.outages[1]:.0f} s without positions"
     return "the accuracy of the measurements"
+
+
+def _cause(fault: Fault) -> str:
+    contradicting = (
+        f"{_plural(fault.kind) if fault.kind else 'fixes'} that contradict the IMU or each other more than was told: "
+    )
+    return {
+        "finite": "arithmetic that left the finite numbers: noise or values in the log that are out of all proportion",
+        "reference": "a fault that the fixes do not show: a lever arm, the time, or the reference's own frame",
+        "told": f"the accuracy of {_plural(fault.kind)}, which the log tells too well",
+        "backward": "the told noise of IMU or measurements, by which the forward pass was surer of itself than it should be",
+        "outage": f"a stretch of {fault.value:.0f} s without positions",
+    }.get(fault.code, contradicting + "their accuracy, their time, the lever arm, or the attitude")
+
+
+def _plural(kind: str) -> str:
+    words = kind.replace("_", " ")
+    return {"velocity": "velocities", "standstill": "standstill"}.get(words, f"{words}s")
 
 
 def _advice_lines(advice: Advice | None) -> list[str]:

@@ -102,7 +102,7 @@ def test_a_poor_run_says_so_and_fails_only_where_asked(folder, log, capsys):
     assert cli.main([*poor, "--quick", "-o", str(folder / "poor")]) == 0
     printed = capsys.readouterr().out
     assert "verdict: poor: " in printed
-    assert "of position were rejected" in printed
+    assert "of positions were rejected" in printed
     assert "most likely to help" not in printed
     assert cli.main([*poor, "--strict", "--json", "-o", str(folder / "strict")]) == 3
     told = json.loads(capsys.readouterr().out)

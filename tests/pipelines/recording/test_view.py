@@ -92,7 +92,9 @@ def test_events_hold_outages_and_findings(recording: Path) -> None:
 def test_the_verdict_is_the_first_event_and_a_property(recording: Path, result: RunResult) -> None:
     first = read_entity(recording, "/events")["TextLog:text"].to_pylist()[0][0]
     assert first.startswith(f"verdict: {result.verdict.grade}")
-    assert "position: " in first
+    document = read_entity(recording, "/verdict", static=True)["TextDocument:text"].to_pylist()[0][0]
+    assert document.startswith(f"**Verdict: {result.verdict.grade}")
+    assert "- positions: " in document
     table = read_entity(recording, "/__properties/verdict", static=True)
     assert table["grade"].to_pylist() == [[result.verdict.grade]]
 

@@ -103,7 +103,7 @@ def test_the_verdict_stands_on_top(folder: Path, result: RunResult) -> None:
     html, markdown = (folder / "report.html").read_text(), (folder / "report.md").read_text()
     assert f'<section class="notice {described["grade"]}"><h2>Verdict: {described["grade"]}: ' in html
     assert markdown.splitlines()[2].startswith(f"**Verdict: {described['grade']}: ")
-    assert sum(line.startswith("- position: ") for line in markdown.splitlines()) == 1
+    assert sum(line.startswith("- positions: ") for line in markdown.splitlines()) == 1
 
 
 def test_warnings_that_differ_in_figures_alone_are_counted_together() -> None:
