@@ -14,6 +14,7 @@ from pipelines.report.comparison import (
     Comparison,
     build_comparison,
     comparison_figures,
+    comparison_notice,
     comparison_plots,
     comparison_tables,
 )
@@ -90,9 +91,9 @@ def write_comparison(comparison: Comparison, out_dir: Path) -> dict[str, Path]:
     report = build_comparison(comparison)
     drive, subtitle = _title(comparison.drawn[0][1])
     title = f"{drive}: {_name_runs(comparison)}"
-    figures, tables = comparison_figures(report), comparison_tables(report)
-    html = render_html(title, subtitle, figures, comparison_plots(comparison), tables, report["configuration"])
-    markdown = render_markdown(title, figures, tables)
+    figures, tables, notice = comparison_figures(report), comparison_tables(report), comparison_notice(report)
+    html = render_html(title, subtitle, figures, comparison_plots(comparison), tables, report["configuration"], notice)
+    markdown = render_markdown(title, figures, tables, notice)
     return _write_files(
         out_dir,
         {

@@ -13,13 +13,14 @@ from pipelines.plotting.plot import Plot, bend_of
 from pipelines.plotting.svg import Layer, Panel, draw_map, draw_time_panels, map_height
 from pipelines.report.content import Report
 from pipelines.report.figures import outage_shades
-from pipelines.report.table import Figure, Table, figure_text
+from pipelines.report.table import Figure, Notice, Table, figure_text
 
 __all__ = [
     "MOST_DRAWN",
     "Comparison",
     "build_comparison",
     "comparison_figures",
+    "comparison_notice",
     "comparison_plots",
     "comparison_tables",
     "overview_table",
@@ -43,6 +44,7 @@ _OWN = (
     "timing_s",
 )
 _HEADLINES = {"position": "3d", "velocity": "3d", "attitude": "heading"}
+_GRADES = ("good", "fair", "poor")
 _STRETCHES = {"all": "whole drive", "outside": "outside outages", "inside": "inside outages"}
 _STYLES = tuple(f"c{number}" for number in range(1, 7))
 MOST_DRAWN = len(_STYLES)
@@ -124,6 +126,15 @@ def overview_table(report: Report) -> Table:
     stretch = "outside outages, which last until a fix is used again" if outages else "whole drive"
     note = f"Errors are RMS, {stretch}; NEES over its expected value: 1 is right."
     return Table("Overview", ("method", *heads), rows, note)
+
+
+def comparison_notice(report: Report) -> Notice:
+    """The verdict on each run, in the colour of the worst."""
+    verdicts = {label: method["verdict"] for label, method in report["methods"].items()}
+    grades = [verdict["grade"] for verdict in verdicts.values()]
+    counts = ", ".join(f"{grades.count(grade)} {grade}" for grade in _GRADES if grade in grades)
+    lines = tuple(f"{label}: {verdict['summary']}" for label, verdict in verdicts.items())
+    return Notice(max(grades, key=_GRADES.index), f"Verdicts: {counts}", lines)
 
 
 def verdict_table(report: Report) -> Table:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from pipelines.report.comparison import Comparison, build_comparison, overview_table
-from pipelines.report.summary import NO_REFERENCE, describe_log
+from pipelines.report.summary import NO_REFERENCE, describe_log, describe_warnings
 from pipelines.report.table import table_lines
 
 __all__ = ["comparison_values", "summarise_comparison"]
@@ -50,5 +50,7 @@ def summarise_comparison(comparison: Comparison) -> list[str]:
     overview = overview_table(report)
     lines = [f"{len(comparison.reports)} runs of {minutes:.1f} min", *describe_log(first)]
     lines += [*table_lines(overview), overview.note] if overview.rows else [NO_REFERENCE]
+    for label, method in report["methods"].items():
+        lines += describe_warnings(method["warnings"], f"{label}: ")
     lines += [f"verdict: {label}: {method['verdict']['summary']}" for label, method in report["methods"].items()]
     return lines + [f"could not run: {variant.label}: {reason}" for variant, reason in comparison.failures]

@@ -1,17 +1,25 @@
 """The headline figures of a run, for the terminal and for programs."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import isfinite
 from pathlib import Path
+from typing import Any
 
 from navreplay.evaluation.metrics import Evaluation, summarise_outages
 from navreplay.evaluation.outages import count_outages
-from navreplay.solution import Solution
 from navreplay.timeline import Provenance
 from pipelines.drive.result import RunResult
 from pipelines.report.verdict import describe_verdict, group_warnings
 
-__all__ = ["NO_REFERENCE", "describe_log", "describe_outputs", "describe_verdict_lines", "headline_figures", "summarise_run"]
+__all__ = [
+    "NO_REFERENCE",
+    "describe_log",
+    "describe_outputs",
+    "describe_verdict_lines",
+    "describe_warnings",
+    "headline_figures",
+    "summarise_run",
+]
 
 _COLOURS = {"good": 32, "fair": 33, "poor": 31}
 """Of a terminal: green, yellow, red."""
@@ -64,18 +72,18 @@ def summarise_run(result: RunResult) -> list[str]:
     solution = result.solution
     minutes = (int(solution.t_ns[-1]) - int(solution.t_ns[0])) / 60e9
     lines = [f"{solution.method}: {minutes:.1f} min, {len(solution)} rows, {sum(result.timing_s.values()):.1f} s to process"]
-    lines += describe_log(result) + _describe_warnings(result.solution)
+    lines += describe_log(result) + describe_warnings(group_warnings(result.solution))
     if result.evaluation is None:
         return [*lines, NO_REFERENCE]
     return lines + _describe_errors(result.evaluation)
 
 
-def _describe_warnings(solution: Solution) -> list[str]:
-    """What the filter warned of, in as many lines as there are kinds of it."""
+def describe_warnings(groups: Sequence[Mapping[str, Any]], of: str = "") -> list[str]:
+    """A line per group of a filter's warnings, as `group_warnings` makes them; of: the name of its run."""
     lines = []
-    for group in group_warnings(solution):
+    for group in groups:
         count = f" ({group['count']} times, first at" if group["count"] > 1 else " (at"
-        lines.append(f"warning: {group['text']}{count} {group['utc'].partition('T')[2][:10]})")
+        lines.append(f"warning: {of}{group['text']}{count} {group['utc'].partition('T')[2][:10]})")
     return lines
 
 

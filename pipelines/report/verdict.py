@@ -114,7 +114,7 @@ def _fault_text(fault: Fault) -> str:
     kind, times = _plural(fault.kind), f"{sqrt(max(fault.value, 0)):.2g} times"
     return {
         "finite": f"{100 * fault.value:.3g} % of the rows are not finite",
-        "rejected": f"{100 * fault.value:.0f} % of {kind} were rejected, and outliers do not explain it",
+        "rejected": f"{100 * fault.value:.2g} % of {kind} were rejected, and outliers do not explain it",
         "innovations": f"innovations of {kind} are {times} as large as they should be",
         "windows": f"innovations of {kind} are more than twice as large as they should be in {_share(fault.value)}",
         "distance": f"the fixes lie {times} as far from the solution as both covariances say",

@@ -185,6 +185,9 @@ def test_compare_runs_every_method_on_the_same_drive(folder, log):
     report = json.loads((path / "report.json").read_text())
     assert "fixed" in json.dumps(report)
     assert "huber" in json.dumps(report)
+    assert {method["verdict"]["grade"] for method in report["methods"].values()} == {"good"}
+    assert '<section class="notice good"><h2>Verdicts: 2 good</h2>' in (path / "report.html").read_text()
+    assert "| huber | good |" in (path / "report.md").read_text()
 
 
 @pytest.mark.parametrize("name", cli.EXPORT_FORMATS)
