@@ -10,6 +10,8 @@ from importers.containers.packed import packing_of, unpack_file
 from importers.containers.remote import address_of, fetch
 from importers.containers.stand_in import Scratch, StandIn, told_as
 from importers.meanings.mapped_log import MappedLog
+from importers.nmea.fixes import read_nmea
+from importers.nmea.sentences import is_nmea
 from importers.rinex.navigation import is_rinex_navigation, read_rinex_navigation
 from importers.rinex.observation import is_rinex_observation, read_rinex_observation
 from importers.rinex.sp3 import is_sp3, read_sp3
@@ -31,7 +33,6 @@ from importers.text.csv_ranges import OWN_RANGES
 from importers.text.headers import draft_table
 from importers.text.kf_gins import find_kf_gins, read_gnss, read_imu
 from importers.text.log import TableLog, TextLog
-from importers.text.nmea import is_nmea, read_nmea
 from importers.text.rtklib_pos import is_pos, read_pos
 from importers.text.smartphone import is_smartphone, read_smartphone
 from importers.text.tum import is_tum, read_tum
@@ -278,7 +279,7 @@ FORMATS: tuple[Format, ...] = (
     Format("navreplay", "this program's own CSV: imu, fix, trajectory, solution", (".csv",), _open_own),
     Format("smartphone", "Android raw measurements (device_gnss.csv)", (".csv",), _open_smartphone),
     Format("pos", "RTKLIB position file", (".pos",), _open_pos),
-    Format("nmea", "NMEA 0183 (GGA and RMC)", (".nmea", ".gga"), _open_nmea),
+    Format("nmea", "NMEA 0183: GGA, GNS, RMC, ZDA, GST, VTG", (".nmea", ".gga"), _open_nmea),
     Format("kf-gins", "KF-GINS text: IMU increments, GNSS positions", (".txt",), _open_kf_gins),
     Format(
         "rinex",

@@ -4,8 +4,8 @@ from datetime import UTC, datetime
 
 import numpy as np
 
+from importers.nmea.fixes import read_sentences
 from importers.rows.log import Table
-from importers.text.nmea import read_sentences
 from navreplay.geodesy.time_scales import LeapSeconds
 from navreplay.timeline import LogError
 

@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 
+from importers.nmea.fixes import NMEA_NOTE
 from importers.roles.ephemeris_messages import EPHEMERIS_TYPES
 from importers.roles.fix_messages import gps_fix, nav_sat_fix
 from importers.roles.range_messages import RANGE_TYPES
@@ -16,7 +17,6 @@ from importers.roles.receiver_types import RECEIVER_TYPES
 from importers.rows.log import Channel, Table
 from importers.rows.message_fields import covariances, numbers_of, vectors
 from importers.rows.tables import Rows
-from importers.text.nmea import NMEA_NOTE
 from navreplay.geodesy.rotation import scalar_first_from_last
 from navreplay.timeline import Floats, LogError
 

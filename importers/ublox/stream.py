@@ -13,8 +13,9 @@ from importers.containers.file_bytes import map_file
 from importers.decoding.blocks import Buffer
 from importers.decoding.byte_rows import gather, records
 from importers.decoding.channel_reading import require_channels
+from importers.nmea.fixes import read_sentences
+from importers.nmea.sentences import find_sentences, is_nmea
 from importers.rows.log import Channel, Table
-from importers.text.nmea import find_sentences, is_nmea, read_sentences
 from importers.ublox import navigation
 from importers.ublox.frames import Frames, find_frames
 from importers.ublox.measurements import RAWX_BLOCK, RAWX_HEAD, measurement_columns
