@@ -160,7 +160,7 @@ def test_a_file_without_messages_is_told_as_such(tmp_path: Path) -> None:
     assert [finding.code for finding in inspection.findings if finding.code in ("damaged", "unreadable")] == []
 
 
-@pytest.mark.parametrize("features", [frozenset(), frozenset({"chunks", "crc"}), frozenset((*SECTIONS, "crc"))], ids=str)
+@pytest.mark.parametrize("features", [frozenset(), frozenset({"chunks", "crc"}), frozenset((*SECTIONS, "crc"))], ids=len)
 def test_a_recording_that_was_not_closed_is_told(tmp_path: Path, features: frozenset[str]) -> None:
     path = write(tmp_path / "log.mcap", features, 10, 1, False)
     path.write_bytes(path.read_bytes()[:-8])

@@ -131,6 +131,7 @@ def test_a_bomb_is_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
         ("a.tgz", gzip.compress(bytes(257) + b"ustar" + bytes(250)), "holds a tar archive; unpack it"),
         ("a.csv.gz", gzip.compress(b"what is this?\n" * 9), "a.csv.gz: unknown format"),
     ],
+    ids=["v12", "v11", "gzip", "zip", "tar", "unknown"],
 )
 def test_what_cannot_be_read_is_told(tmp_path: Path, name: str, content: bytes, problem: str) -> None:
     path = tmp_path / name
