@@ -1,6 +1,8 @@
 """Findings from the motion that IMU and GNSS both saw: time offset, leap seconds, unit and sign of the yaw rate, forward
 axis."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from importers.findings import Finding
@@ -22,7 +24,8 @@ def check_motion(imu: ImuSeries, fixes: GnssFixSeries) -> list[Finding]:
         seen = "too few turns" if match is None else f"yaw rate and course agree only to {abs(match.correlation):.2f}"
         text = f"The time offset between IMU and GNSS cannot be estimated from this log ({seen})."
         return [Finding("info", "time-offset", text, "")]
-    wrong = _check_yaw(match)
+    wrong = _check_mirrored(imu, fixes) if match.slope < 0 else []
+    wrong = wrong or _check_yaw(match)
     return [_check_offset(match), *(wrong or _check_forward(imu, fixes, match.offset_s))]
 
 
@@ -39,7 +42,39 @@ def _check_offset(match: YawMatch) -> Finding:
             f"Set input.imu.time_offset_s = {match.offset_s:.2f} (on top of any you have set), and check it by the residuals."
         )
         return Finding("warning", "time-offset", text, hint)
+    if abs(match.offset_s) > _TOLD_S:
+        text = f"The time offset between IMU and GNSS is known no better than {figure}: too little turning to tell."
+        return Finding("info", "time-offset", text, "")
     return Finding("info", "time-offset", f"IMU and GNSS agree in time, to about 0.1 s: the estimated offset is {figure}.", "")
+
+
+def _check_mirrored(imu: ImuSeries, fixes: GnssFixSeries) -> list[Finding]:
+    """Turns that go the other way on the map than in the gyros: positions that a mirror of the map makes right."""
+    lla = fixes.lla
+    within = np.nanmax(np.abs(lla[:, 1])) < np.pi / 2
+    tried = {
+        "latitude and longitude seem to be exchanged": lla[:, [1, 0, 2]] if within else None,
+        "the sign of the longitude (or of the latitude) seems to be lost: west or south given without a sign": lla * [1, -1, 1],
+    }
+    best, words = 0.0, ""
+    for text, mirrored in tried.items():
+        if mirrored is None:
+            continue
+        bare = np.full_like(fixes.vel_n, np.nan)
+        alone = replace(fixes, lla=mirrored, vel_n=bare, cov_vel=np.full_like(fixes.cov_vel, np.nan))
+        match = match_yaw(imu, alone) if alone.has_position.all() else None
+        if match is not None and match.slope > 0 and match.correlation > max(best, _SURE) and 0.8 < match.slope < 1.25:
+            best, words = match.correlation, text
+    if not words:
+        return []
+    first = np.degrees(lla[np.flatnonzero(fixes.has_position)[0], :2])
+    text = (
+        f"The fixes turn the other way than the IMU on the map, as if it were mirrored: {words} (the first fix is at latitude "
+        f"{first[0]:.6f}, longitude {first[1]:.6f})."
+    )
+    return [
+        Finding("error", "positions-mirrored", text, "Exchange the columns or mend the sign where the log is made or mapped.")
+    ]
 
 
 def _check_yaw(match: YawMatch) -> list[Finding]:

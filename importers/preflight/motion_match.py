@@ -26,6 +26,8 @@ _JITTER_NS = 5 * 10**7
 _LONGEST_INTERVAL_S = 2.5
 _FASTEST_TURN = 1.0
 _OUTLIER = 5.0
+_AMBIGUOUS = 0.1
+"""Of correlation that a lag may lack and still be as good as another."""
 _HARDEST_BRAKING = 12.0
 
 
@@ -141,7 +143,7 @@ def _mean_rate(total: Floats, start_s: Floats, end_s: Floats) -> Floats:
 
 def _best_lag(turn: Floats, start_s: Floats, end_s: Floats, rate: Floats, limit: float) -> YawMatch:
     """Coarse search, then a fine one without the intervals whose course the receiver evidently had wrong."""
-    best = _search(turn, start_s, end_s, rate, np.arange(-limit, limit + 0.1, 0.2))
+    best = _coarse_lag(turn, start_s, end_s, rate, limit)
     _, slope = _fit(_mean_rate(turn, start_s - best, end_s - best), rate)
     misfit = rate - slope * _mean_rate(turn, start_s - best, end_s - best)
     misfit = np.abs(misfit - np.median(misfit))
@@ -153,6 +155,18 @@ def _best_lag(turn: Floats, start_s: Floats, end_s: Floats, rate: Floats, limit:
     r, slope = _fit(felt, rate)
     std = float(np.std(rate - slope * felt)) / max(abs(slope) * float(np.sqrt(np.sum(change**2))), 1e-12)
     return YawMatch(best, std, r, slope)
+
+
+def _coarse_lag(turn: Floats, start_s: Floats, end_s: Floats, rate: Floats, limit: float) -> float:
+    """The lag of greatest correlation; a near one where a far one explains hardly more: laps repeat themselves, and a lag of a
+    lap is no evidence of an offset."""
+    far = _search(turn, start_s, end_s, rate, np.arange(-limit, limit + 0.1, 0.2))
+    if abs(far) <= _SHORT_LAG_S:
+        return far
+    near = _search(turn, start_s, end_s, rate, np.arange(-_SHORT_LAG_S, _SHORT_LAG_S + 0.1, 0.2))
+    at_far, at_near = (_fit(_mean_rate(turn, start_s - lag, end_s - lag), rate)[0] for lag in (far, near))
+    same_way = at_far * at_near > 0
+    return near if same_way and 1 - abs(at_near) < max(_AMBIGUOUS, 3 * (1 - abs(at_far))) else far
 
 
 def _search(turn: Floats, start_s: Floats, end_s: Floats, rate: Floats, lags: Floats) -> float:

@@ -12,6 +12,7 @@ from importers.rows.clock import gps_from_stamps
 from importers.rows.log import Channel, Table
 from importers.rows.message_fields import either_spelling
 from importers.rows.screening import Screening
+from importers.rows.stamps import mend_stamps
 from importers.rows.tables import Rows
 from importers.settings import AttitudeInput, FixInput, ImuInput, ReferenceInput
 from navreplay.geodesy.time_scales import LeapSeconds
@@ -61,7 +62,7 @@ def join_sources(
 ) -> Joined:
     """Joins the parts of a channel (a recording split into files) in the order of their first stamps. Raises LogError."""
     notes: list[str] = []
-    timed = [(_times(source, settings, clock, notes), source) for source in sources]
+    timed = [(_mended(source, _times(source, settings, clock, notes), notes), source) for source in sources]
     timed.sort(key=lambda pair: int(pair[0][0]) if len(pair[0]) else 0)
     ordered = tuple(source for _, source in timed)
     rows = []
@@ -82,6 +83,13 @@ def join_sources(
     if len(t_ns) == 0:
         raise _nothing_readable(ordered[0])
     return Joined(ordered[0].channel.name, t_ns, _concatenate(rows), ordered, parts, tuple(dict.fromkeys(notes)))
+
+
+def _mended(source: Source, t_ns: Times, notes: list[str]) -> Times:
+    """Stamps without the batches of a driver and the steps of a clock."""
+    mended, told = mend_stamps(t_ns)
+    notes += [f"{source.channel.name}: {note}" for note in told]
+    return mended
 
 
 def account(joined: Joined, screening: Screening) -> tuple[ChannelUse, ...]:

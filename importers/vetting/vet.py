@@ -8,6 +8,7 @@ from importers.vetting.jumps import leave_out_jumps
 from importers.vetting.repeats import leave_out_repeats
 from importers.vetting.velocities import vet_velocities
 from importers.vetting.vetted import Vetted
+from importers.vetting.weeks import unroll_weeks
 from navreplay.timeline import ChannelUse, Timeline
 
 __all__ = ["vet"]
@@ -21,7 +22,8 @@ def vet(timeline: Timeline) -> tuple[Timeline, tuple[Finding, ...]]:
     fixes = timeline.fixes
     if fixes is None:
         return timeline, ()
-    findings: list[Finding] = []
+    unrolled = unroll_weeks(fixes, timeline.imu)
+    fixes, findings = unrolled.fixes, [*unrolled.findings]
     channels = timeline.provenance.channels
     for step in (leave_out_repeats, vet_velocities, leave_out_jumps):
         vetted = step(fixes)

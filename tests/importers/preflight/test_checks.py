@@ -8,9 +8,11 @@ import pytest
 from importers import inspect_logs, load_timeline
 from importers.preflight.checks import preflight
 from importers.preflight.motion_match import match_forward, match_yaw
+from navreplay.geodesy.earth import move_lla
 from navreplay.geodesy.rotation import flu_from_frd
-from navreplay.timeline import ImuSeries, LogError, Timeline
+from navreplay.timeline import GnssFixSeries, ImuSeries, LogError, Timeline
 from synthetic_logs import SCENARIOS, simulate, write
+from tests.field.promise import spoil
 
 DRIVE = simulate(SCENARIOS["car-short"], 3)
 LOG = Timeline(imu=DRIVE.imu, fixes=DRIVE.fixes, reference=DRIVE.truth)
@@ -197,3 +199,38 @@ def test_progress_reaches_the_end_and_counts_balance(tmp_path):
 def test_nothing_to_load_is_an_error():
     with pytest.raises(LogError, match="no log was named"):
         load_timeline([])
+
+
+@pytest.mark.parametrize(
+    ("mirror", "told"),
+    [
+        (lambda lla: lla[:, [1, 0, 2]], "latitude and longitude seem to be exchanged"),
+        (lambda lla: lla * [1, -1, 1], "sign of the longitude"),
+    ],
+)
+def test_a_mirrored_map_is_told_as_such(mirror, told: str) -> None:
+    timeline = spoil("town-rtk", None).log.timeline()
+    bare = np.full_like(timeline.fixes.vel_n, np.nan)
+    fixes = replace(
+        timeline.fixes, lla=mirror(timeline.fixes.lla), vel_n=bare, cov_vel=np.full_like(timeline.fixes.cov_vel, np.nan)
+    )
+    (finding,) = (one for one in preflight(replace(timeline, fixes=fixes, reference=None)) if one.level == "error")
+    assert finding.code == "positions-mirrored"
+    assert told in finding.text
+
+
+def test_laps_are_no_evidence_of_an_offset() -> None:
+    """Turns that repeat every 18 s; the true lag is none."""
+    t = np.arange(0, 150, 0.01)
+    yaw_rate = 0.3 * np.sin(2 * np.pi * t / 18)
+    yaw = np.cumsum(yaw_rate) * 0.01
+    place = np.cumsum(np.column_stack([np.cos(yaw), np.sin(yaw), 0 * t]) * 0.1, axis=0)
+    t_ns = 1_300_000_000_000_000_000 + np.rint(t * 1e9).astype(np.int64)
+    imu = ImuSeries(t_ns, np.column_stack([0 * t, 0 * t, yaw_rate]), np.tile([0.0, 0.0, -9.8], (len(t), 1)))
+    rows = slice(0, None, 20)
+    lla = move_lla(np.tile([0.84, 0.2, 500.0], (len(t[rows]), 1)), place[rows])
+    n, unknown = len(lla), np.full((len(lla), 3), np.nan)
+    fixes = GnssFixSeries(
+        t_ns[rows], lla, unknown, np.tile(np.eye(3), (n, 1, 1)), np.full((n, 3, 3), np.nan), np.zeros(n, np.int8)
+    )
+    assert abs(match_yaw(imu, fixes).offset_s) < 0.1
