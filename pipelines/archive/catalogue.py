@@ -73,6 +73,7 @@ def describe(result: RunResult, vehicle: str) -> dict[str, Any]:
     lasting = [(outage.end_ns - outage.start_ns) / 1e9 for outage in solution.outages]
     warnings = sum(event.level == "warning" for event in solution.events)
     row: dict[str, Any] = {
+        "verdict": result.verdict.grade,
         "vehicle": vehicle,
         "start_utc": utc_text(solution.t_ns[:1])[0],
         "duration_s": (int(solution.t_ns[-1]) - int(solution.t_ns[0])) / 1e9,
