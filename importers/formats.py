@@ -216,7 +216,7 @@ def _open_nmea(path: str, head: bytes, settings: InputSettings) -> Log | None:
 
 
 def _open_kf_gins(path: str, head: bytes, settings: InputSettings) -> Log | None:
-    layout = find_kf_gins(_text(head))
+    layout = find_kf_gins(path, _text(head))
     if layout is None:
         return None
     read = read_imu if layout == "kf_gins/imu" else read_gnss

@@ -10,16 +10,18 @@ from importers.rows.log import Table
 from importers.rows.tables import diagonal_covariance, drop_absurd
 from importers.text.table import Selection, parse_text, read_bytes, select_columns
 from navreplay.geodesy.time_scales import WEEK_S, gps_from_week_tow
-from navreplay.timeline import Floats
+from navreplay.timeline import Floats, LogError
 
 __all__ = ["find_kf_gins", "read_gnss", "read_imu"]
 
+_MOST_FORCE = 20.0
 _LONGEST_INCREMENT = 1.5
 """In nominal intervals: an increment behind a longer pause covers one nominal interval, not the pause."""
 
 
-def find_kf_gins(head: str) -> str | None:
-    """``kf_gins/imu`` or ``kf_gins/gnss`` when the first lines of a file look like one, else None."""
+def find_kf_gins(path: str, head: str) -> str | None:
+    """``kf_gins/imu`` or ``kf_gins/gnss`` when the first lines of a file look like one, else None. Raises LogError for
+    rows of an inertial sensor that are no increments."""
     rows = [line.split() for line in head.splitlines()[:20] if line.strip() and not line.startswith("#")]
     if len(rows) > 1:
         rows = rows[:-1]
@@ -30,9 +32,23 @@ def find_kf_gins(head: str) -> str | None:
     if values.ndim != 2 or values.shape[1] not in (7, 13) or not ((values[:, 0] >= 0) & (values[:, 0] < WEEK_S)).all():
         return None
     if values.shape[1] == 7 and np.median(np.abs(values[:, 1:]), axis=0).max() < 1.0:
+        _check_increments(path, values, rows)
         return "kf_gins/imu"
     on_earth = (np.abs(values[:, 1]) <= 90) & (np.abs(values[:, 2]) <= 180) & (values[:, 4:7] > 0).all(axis=1)
     return "kf_gins/gnss" if on_earth.all() else None
+
+
+def _check_increments(path: str, values: Floats, rows: list[list[str]]) -> None:
+    """Raises LogError where velocity increments would add up to more than gravity."""
+    interval = float(np.median(np.diff(values[:, 0]))) if len(values) > 2 else 0.0
+    force = float(np.median(np.linalg.norm(values[:, 4:], axis=1))) / interval if interval > 0 else 0.0
+    if force > _MOST_FORCE:
+        raise LogError(
+            f"{path}: has the 7 columns of KF-GINS increments, but its rows, such as '{' '.join(rows[0])}', would be "
+            f"{force:.3g} m/s2 where gravity is 9.8; if they are rates and accelerations, say so in an [[input.csv]]: "
+            "role = 'imu', time = { column = 1, base = 'gps_tow' }, columns = { gyro_x = 2, gyro_y = 3, gyro_z = 4, "
+            "accel_x = 5, accel_y = 6, accel_z = 7 }"
+        )
 
 
 def read_imu(path: str, gps_week: int | None) -> Table:

@@ -9,6 +9,7 @@ from importers.rows.clock import gps_from_gps_unix
 from importers.rows.log import Table
 from importers.rows.tables import NO_FIX, drop_absurd, status_codes
 from importers.text.table import Selection, parse_text, read_bytes, select_columns
+from importers.text.times import read_dates
 from navreplay.geodesy.earth import lla_from_ecef, matrix_en
 from navreplay.geodesy.time_scales import WEEK_S, LeapSeconds, gps_from_utc, gps_from_week_tow
 from navreplay.timeline import FixStatus, Floats, LogError, Times
@@ -18,6 +19,8 @@ __all__ = ["is_pos", "read_pos"]
 _GEODETIC = ("latitude(deg)", "longitude(deg)", "height(m)")
 _EARTH_FIXED = ("x-ecef(m)", "y-ecef(m)", "z-ecef(m)")
 _LAST_WEEK = 10_000
+_SEPARATORS = bytes.maketrans(b",;|\t", b"    ")
+"""What ``out-fieldsep`` may say; date and time of day, or week and seconds, are two fields with any of them."""
 _JAPAN_NS = 9 * 3600 * 10**9
 _STATUS = {
     "0": NO_FIX,
@@ -43,7 +46,7 @@ def read_pos(path: str, leap: LeapSeconds) -> Table:
 
     data = read_bytes(path)
     names = _read_names(path, data)
-    text = parse_text(data, header=False, comment="%")
+    text = parse_text(data.translate(_SEPARATORS), " ", header=False, comment="%")
     if text.read == 0:
         raise LogError(f"{path}: the position file holds no rows; did the receiver or the processing have any fix?")
     index = {name: i + 2 for i, name in enumerate(names[1:]) if i + 2 in text.frame.columns}
@@ -52,7 +55,7 @@ def read_pos(path: str, leap: LeapSeconds) -> Table:
     dated = not pd.api.types.is_numeric_dtype(text.frame.get(0, pd.Series(dtype=float)))
     clock = {"first": 0, "second": 1}
     selection = select_columns(text, index if dated else index | clock, clock if dated else None)
-    t_ns, timed = _read_times(selection, names[0], dated, leap)
+    t_ns, timed = _read_times(path, selection, names[0], dated, leap)
     columns = {name: values[timed] for name, values in selection.columns.items()}
     rejected = dict(selection.rejected)
     if not timed.all():
@@ -63,7 +66,7 @@ def read_pos(path: str, leap: LeapSeconds) -> Table:
 def _read_names(path: str, data: bytes) -> list[str]:
     head = data[:20_000].decode(errors="replace")
     line = next(line for line in head.splitlines() if is_pos(line))
-    names = line.lstrip("% ").replace(",", " ").replace(";", " ").split()
+    names = line.encode().translate(_SEPARATORS).decode(errors="replace").lstrip("% ").split()
     if names[1:4] == list(_GEODETIC) or names[1:4] == list(_EARTH_FIXED):
         return names
     raise LogError(
@@ -72,18 +75,15 @@ def _read_names(path: str, data: bytes) -> list[str]:
     )
 
 
-def _read_times(selection: Selection, scale: str, dated: bool, leap: LeapSeconds) -> tuple[Times, np.ndarray]:
+def _read_times(path: str, selection: Selection, scale: str, dated: bool, leap: LeapSeconds) -> tuple[Times, np.ndarray]:
     first, second = selection.columns["first"], selection.columns["second"]
     if not dated:
         timed = (first >= 0) & (first < _LAST_WEEK) & (second >= 0) & (second < WEEK_S)
         t_ns = gps_from_week_tow(first[timed].astype(np.int64), second[timed])
         return t_ns, timed
-    import pandas as pd
-
-    joined = pd.Series(first) + " " + pd.Series(second)
-    stamps = pd.to_datetime(joined, format="%Y/%m/%d %H:%M:%S.%f", errors="coerce")
-    timed = stamps.notna().to_numpy()
-    unix_ns = stamps[timed].to_numpy().astype("datetime64[ns]").astype(np.int64)
+    unix_ns, timed = read_dates(
+        np.array([" ".join(pair) for pair in zip(first, second, strict=True)], dtype=object), None, path
+    )
     if scale == "GPST":
         return gps_from_gps_unix(unix_ns), timed
     return gps_from_utc(unix_ns - (_JAPAN_NS if scale == "JST" else 0), leap), timed

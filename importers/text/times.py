@@ -1,6 +1,7 @@
 """Times of the rows of a table: counts of any unit, and dates as they are written."""
 
 import re
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +10,9 @@ from importers.rows.clock import count_ns, gps_from_gps_unix, is_time, unwrap_we
 from importers.settings import CsvTime
 from navreplay.geodesy.time_scales import LeapSeconds, gps_from_tai, gps_from_utc, gps_from_week_tow
 from navreplay.timeline import LogError, Times
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 __all__ = ["check_rounding", "read_counts", "read_dates", "unit_of_counts"]
 
@@ -93,14 +97,18 @@ def read_dates(cells: np.ndarray, day_first: bool | None, place: str) -> tuple[T
     parts = [match.groups() for match in matches if match is not None and len(match.group(1)) < 3]
     first_is_day = _day_first([(int(a), int(b)) for a, b, _, _ in parts], texts, day_first, place) if parts else False
     iso = [text if match is None else _iso(match, first_is_day) for text, match in zip(texts, matches, strict=True)]
-    stamps = pd.to_datetime(pd.Series(iso, dtype=object), format="ISO8601", errors="coerce", utc=True).dt.as_unit("ns")
+    texts_of_iso = pd.Series(iso, dtype=object)
+    stamps = _bounded(pd.to_datetime(texts_of_iso, format="ISO8601", errors="coerce", utc=True))
     odd = stamps.isna()
     if odd.any():
-        stamps[odd] = pd.to_datetime(pd.Series(iso, dtype=object)[odd], format="mixed", errors="coerce", utc=True).dt.as_unit(
-            "ns"
-        )
+        stamps[odd] = _bounded(pd.to_datetime(texts_of_iso[odd], format="mixed", errors="coerce", utc=True))
     timed = stamps.notna().to_numpy()
     return stamps[timed].dt.tz_localize(None).to_numpy().astype("datetime64[ns]").astype(np.int64), timed
+
+
+def _bounded(stamps: "pd.Series") -> "pd.Series":
+    """Dates of this and the last century in nanoseconds; others are none."""
+    return stamps.where(stamps.dt.year.between(1900, 2100)).dt.as_unit("ns")
 
 
 def _day_first(parts: list[tuple[int, int]], texts: list[str], told: bool | None, place: str) -> bool:
