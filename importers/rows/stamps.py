@@ -64,6 +64,8 @@ def _undo_steps(t_ns: Times, notes: list[str]) -> Times:
     for at in back.tolist():
         around = np.concatenate([steps[max(at - _BESIDE, 0) : at], steps[at + 1 : at + 1 + _BESIDE]])
         even = np.mean((around > 0) & (around < _REGULAR * usual)) if len(around) else 0.0
+        if len(around) and around.max() > max(-steps[at] / 2, _REGULAR * usual):
+            return t_ns  # there and back again: a few stamps that are wrong, not a clock
         if even < 0.95 or len(around) < _BESIDE // 2 or -steps[at] > _LONGEST_STEP_NS or -steps[at] < 2 * usual:
             return t_ns
         shift = round(usual) - int(steps[at])
