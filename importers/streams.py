@@ -46,7 +46,7 @@ def open_novatel_stream(path: str, head: bytes, settings: InputSettings) -> Log 
     """See `importers.formats.Format.open`."""
     if not _beginning(path, head, _NOVATEL):
         return None
-    from importers.receivers.novatel import is_novatel, open_novatel
+    from importers.novatel.stream import is_novatel, open_novatel
 
     return open_novatel(path) if _holds(path, head, _NOVATEL, is_novatel) else None
 
@@ -55,7 +55,7 @@ def open_sbf_stream(path: str, head: bytes, settings: InputSettings) -> Log | No
     """See `importers.formats.Format.open`."""
     if not _beginning(path, head, _SBF):
         return None
-    from importers.receivers.sbf import is_sbf, open_sbf
+    from importers.septentrio.stream import is_sbf, open_sbf
 
     return open_sbf(path) if _holds(path, head, _SBF, is_sbf) else None
 

@@ -1,1 +1,1 @@
-"""Streams of NovAtel OEM and Septentrio receivers. Uses decoding and rows; a further message is read here."""
+"""What streams of several makes of receivers share: frames and their checksums, and RTCM 3. Uses decoding and rows."""

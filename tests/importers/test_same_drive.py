@@ -16,8 +16,8 @@ from navreplay.timeline import Floats, GnssFixSeries
 from synthetic_logs import SCENARIOS, simulate, with_duration
 from tests.importers.autopilots import test_ardupilot as ardupilot
 from tests.importers.autopilots import test_px4 as px4
-from tests.importers.receivers import test_novatel as novatel
-from tests.importers.receivers import test_sbf as sbf
+from tests.importers.novatel import test_stream as novatel
+from tests.importers.septentrio import test_stream as sbf
 from tests.importers.ublox import test_navigation as ublox
 
 LOG = simulate(with_duration(SCENARIOS["car-outages"], 20.0), 3)

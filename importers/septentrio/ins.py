@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 
 from importers.decoding.blocks import Buffer, Offsets
 from importers.decoding.byte_rows import records
-from importers.receivers.sbf_fixes import known, status_of
 from importers.rows.tables import diagonal_covariance
+from importers.septentrio.fixes import known, status_of
 from navreplay.geodesy.rotation import quat_from_euler
 from navreplay.timeline import Floats, Times
 

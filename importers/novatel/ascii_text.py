@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from importers.receivers.novatel_words import WORDS
+from importers.novatel.words import WORDS
 from navreplay.geodesy.time_scales import WEEK_S
 from navreplay.timeline import Times
 

@@ -15,12 +15,12 @@ from importers.containers.file_bytes import map_file
 from importers.decoding.blocks import Buffer, Offsets
 from importers.decoding.byte_rows import gather, records
 from importers.decoding.channel_log import ChannelLog
+from importers.novatel.ascii_text import ascii_messages
+from importers.novatel.fixes import POSITION, VELOCITY, positions, velocities
+from importers.novatel.imu import RAW, RAW_EXTENDED, raw_samples
+from importers.novatel.ins import INSPVA, INSPVAX, inertial_solution
+from importers.novatel.ranges import OBSERVATION, observations
 from importers.receivers.frame_scan import CRC32, scan_novatel
-from importers.receivers.novatel_ascii import ascii_messages
-from importers.receivers.novatel_fixes import POSITION, VELOCITY, positions, velocities
-from importers.receivers.novatel_imu import RAW, RAW_EXTENDED, raw_samples
-from importers.receivers.novatel_ins import INSPVA, INSPVAX, inertial_solution
-from importers.receivers.novatel_ranges import OBSERVATION, observations
 from importers.rows.log import Channel, Table
 from navreplay.geodesy.time_scales import WEEK_S
 from navreplay.timeline import LogError, Times

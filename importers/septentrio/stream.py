@@ -15,12 +15,12 @@ from importers.decoding.blocks import Buffer, Offsets
 from importers.decoding.byte_rows import records
 from importers.decoding.channel_log import ChannelLog
 from importers.receivers.frame_scan import CRC16_CCITT, scan_sbf
-from importers.receivers.sbf_ephemerides import EPHEMERIS_BLOCKS, ephemerides
-from importers.receivers.sbf_fixes import POSITION_COVARIANCE, SOLUTION, VELOCITY_COVARIANCE, solutions
-from importers.receivers.sbf_imu import sensor_samples
-from importers.receivers.sbf_ins import inertial_solution
-from importers.receivers.sbf_ranges import observations
 from importers.rows.log import Channel, Table
+from importers.septentrio.ephemerides import EPHEMERIS_BLOCKS, ephemerides
+from importers.septentrio.fixes import POSITION_COVARIANCE, SOLUTION, VELOCITY_COVARIANCE, solutions
+from importers.septentrio.imu import sensor_samples
+from importers.septentrio.ins import inertial_solution
+from importers.septentrio.ranges import observations
 from navreplay.geodesy.time_scales import WEEK_S
 from navreplay.timeline import LogError, Times
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from importers.decoding.blocks import Buffer, Offsets
 from importers.decoding.byte_rows import records
-from importers.receivers.sbf_fixes import known
 from importers.satellites.ephemeris import GLONASS, KEPLER
+from importers.septentrio.fixes import known
 from navreplay.geodesy.time_scales import WEEK_S
 from navreplay.timeline import Times
 
