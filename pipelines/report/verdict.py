@@ -20,6 +20,7 @@ __all__ = ["describe_verdict", "group_warnings", "verdict_notice"]
 
 _FIGURE = re.compile(r"\d[\d.e+-]*")
 _LONG_OUTAGE_S = 10.0
+_FAR_BETTER = 0.05
 
 
 def describe_verdict(result: RunResult) -> dict[str, Any]:
@@ -197,6 +198,9 @@ def _limit(result: RunResult) -> str:
         return _cause(verdict.faults[0])
     if verdict.outages[1] > _LONG_OUTAGE_S:
         return f"a stretch of {verdict.outages[1]:.0f} s without positions"
+    better = [use.kind for use in verdict.kinds if use.kind in ("position", "range") and use.nis < _FAR_BETTER]
+    if better:
+        return f"the accuracy of {_plural(better[0])}, which lie far closer to the prediction than the log tells of them"
     return "the accuracy of the measurements"
 
 
