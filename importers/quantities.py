@@ -127,15 +127,18 @@ class Settings(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
-def check_axes(axes: str) -> str:
-    """The axes as they are. Raises ValueError unless they are ``auto``, or three letters that make a right-handed triad."""
+def check_axes(axes: str, right_handed: bool = True) -> str:
+    """The axes as they are. Raises ValueError unless they are ``auto``, or three letters that make a triad, right-handed where
+    that is asked for."""
     if axes == "auto":
         return axes
     if len(axes) != 3 or any(letter not in _ALONG for letter in axes):
         raise ValueError("axes must be 'auto' or three letters of f, b, r, l, u, d, such as 'flu' or 'frd'")
     x, y, z = (_ALONG[letter] for letter in axes)
     cross = (x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0])
-    if cross != z:
+    if not any(cross) or cross not in (z, tuple(-part for part in z)):
+        raise ValueError(f"axes '{axes}' are no triad; each of forward, right and down (or its opposite) is needed once")
+    if right_handed and cross != z:
         raise ValueError(f"axes '{axes}' are not a right-handed triad; one of the letters points the wrong way")
     return axes
 

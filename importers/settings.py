@@ -44,10 +44,11 @@ __all__ = [
 
 class ImuInput(Settings):
     """The inertial sensor. accel_channel: where another channel holds the accelerations. axes: where its x, y, z point in
-    the vehicle (forward, back, right, left, up, down), right-handed. mounting_deg: roll, pitch, yaw of the so relabelled
-    axes against the vehicle. increments: each sample is the mean over the interval that ends at its stamp. time_offset_s is
-    added to its stamps; with the time base ``boot`` of a text file it is the GPS time, in seconds since 1980-01-06, at
-    which the sensor's clock read zero."""
+    the vehicle (forward, back, right, left, up, down), right-handed. gyro_axes: the same of the angular rates where they
+    differ (turns counted to the left beside accelerations that point down), of either hand. mounting_deg: roll, pitch, yaw
+    of the so relabelled axes against the vehicle. increments: each sample is the mean over the interval that ends at its
+    stamp. time_offset_s is added to its stamps; with the time base ``boot`` of a text file it is the GPS time, in seconds
+    since 1980-01-06, at which the sensor's clock read zero."""
 
     channel: str | None = None
     accel_channel: str | None = None
@@ -55,6 +56,7 @@ class ImuInput(Settings):
     time_base: TimeBase = "auto"
     time_offset_s: float = 0.0
     axes: str = "auto"
+    gyro_axes: str = "auto"
     mounting_deg: Vector = (0.0, 0.0, 0.0)
     gyro_unit: Literal["auto", "rad/s", "deg/s"] = "auto"
     accel_unit: Literal["auto", "m/s2", "g"] = "auto"
@@ -64,6 +66,11 @@ class ImuInput(Settings):
     @classmethod
     def _check_axes(cls, axes: str) -> str:
         return check_axes(axes)
+
+    @field_validator("gyro_axes")
+    @classmethod
+    def _check_gyro_axes(cls, axes: str) -> str:
+        return check_axes(axes, right_handed=False)
 
 
 class FixInput(Settings):

@@ -39,15 +39,18 @@ def convert_imu(
         raise LogError(f"{joined.name}: none of its {len(joined.t_ns)} samples is usable: {screening.rejected(slice(None))}")
     gyro_unit, accel_unit, notes = _find_units(joined.name, rows, order, settings)
     axes = rows.sensor_axes if settings.axes == "auto" else settings.axes
+    gyro_axes = axes if settings.gyro_axes == "auto" else settings.gyro_axes
     turn = axes_matrix(axes, settings.mounting_deg)
     if axes != "frd" or any(settings.mounting_deg):
         mounted = f", mounted at {settings.mounting_deg} deg" if any(settings.mounting_deg) else ""
         notes.append(f"{joined.name}: sensor axes {axes}{mounted} were turned to forward-right-down")
     elif settings.axes == "auto" and not rows.units_known:
         notes.append(f"{joined.name}: its axes are taken as forward, right, down")
+    if gyro_axes != axes:
+        notes.append(f"{joined.name}: the axes of its angular rates are taken as {gyro_axes}")
     series = ImuSeries(
         joined.t_ns[order],
-        _turn(rows.gyro[order] * _FACTORS[gyro_unit], turn),
+        _turn(rows.gyro[order] * _FACTORS[gyro_unit], axes_matrix(gyro_axes, settings.mounting_deg)),
         _turn(rows.accel[order] * _FACTORS[accel_unit], turn),
         settings.increments or rows.means,
     )

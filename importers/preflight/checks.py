@@ -55,7 +55,7 @@ def preflight(timeline: Timeline) -> tuple[Finding, ...]:
         findings += _check_covariance(fixes)
     if imu is not None and fixes is not None:
         apart = _check_overlap(imu, fixes)
-        findings += apart or check_motion(imu, fixes)
+        findings += apart or check_motion(imu, fixes, dict(timeline.provenance.recognised).get("input.imu.axes", ""))
     if reference is not None:
         findings += _check_reference(reference, imu, fixes)
     once: dict[str, Finding] = {}

@@ -14,18 +14,21 @@ __all__ = ["check_motion"]
 _SURE = 0.6
 _TOLD_S = 0.15
 _STEPS_S = {18.0: "UTC and GPS time", 37.0: "UTC and TAI", 19.0: "GPS time and TAI"}
+_LEAST_SECONDS = 20
+_AGAINST = 0.5
+_OPPOSITE = {"r": "l", "l": "r", "u": "d", "d": "u"}
 _ASKEW = np.radians(25.0)
 
 
-def check_motion(imu: ImuSeries, fixes: GnssFixSeries) -> list[Finding]:
-    """Findings about an IMU and fixes that overlap in time."""
+def check_motion(imu: ImuSeries, fixes: GnssFixSeries, axes: str = "") -> list[Finding]:
+    """Findings about an IMU and fixes that overlap in time. axes: of the IMU where they were recognised, for proposals."""
     match = match_yaw(imu, fixes)
     if match is None or abs(match.correlation) < _SURE:
         seen = "too few turns" if match is None else f"yaw rate and course agree only to {abs(match.correlation):.2f}"
         text = f"The time offset between IMU and GNSS cannot be estimated from this log ({seen})."
         return [Finding("info", "time-offset", text, "")]
-    wrong = _check_mirrored(imu, fixes) if match.slope < 0 else []
-    wrong = wrong or _check_yaw(match)
+    wrong = _check_mirrored(imu, fixes) if match.slope < 0 and not _turns_against_forces(imu) else []
+    wrong = wrong or _check_yaw(match, axes)
     return [_check_offset(match), *(wrong or _check_forward(imu, fixes, match.offset_s))]
 
 
@@ -77,10 +80,33 @@ def _check_mirrored(imu: ImuSeries, fixes: GnssFixSeries) -> list[Finding]:
     ]
 
 
-def _check_yaw(match: YawMatch) -> list[Finding]:
+def _turns_against_forces(imu: ImuSeries) -> bool:
+    """Whether the vehicle is pushed to the left where its gyros say it turns to the right: then these are mirrored, not the
+    map, since a turn to the right needs a force to the right."""
+    step = max(round(1e9 / float(np.median(np.diff(imu.t_ns)))), 1)
+    whole = len(imu.t_ns) // step * step
+    rate, force = (values[:whole].reshape(-1, step).mean(axis=1) for values in (imu.gyro[:, 2], imu.accel[:, 1]))
+    if len(rate) < _LEAST_SECONDS or min(np.std(rate), np.std(force)) == 0:
+        return False
+    return bool(np.corrcoef(rate, force)[0, 1] < -_AGAINST)
+
+
+def _other_turns(axes: str) -> str:
+    """A setting under which rates about all axes but the forward one change their sign."""
+    if not axes:
+        return "input.imu.gyro_axes, the letters of input.imu.axes with all but f and b turned round."
+    turned = "".join(letter if letter in "fb" else _OPPOSITE[letter] for letter in axes)
+    return f"input.imu.gyro_axes = '{turned}' (the accelerations have '{axes}')."
+
+
+def _check_yaw(match: YawMatch, axes: str) -> list[Finding]:
     if match.slope < 0:
         text = "The yaw rate has the opposite sign of the course rate: axes mirrored, or gyros or gravity inverted."
-        return [Finding("error", "yaw-sign", text, "Set input.imu.axes; check the signs of the sensor's columns.")]
+        hint = (
+            "Set input.imu.axes; where the accelerations are right and only turns are counted the other way, set the axes "
+            f"of the angular rates: {_other_turns(axes)}"
+        )
+        return [Finding("error", "yaw-sign", text, hint)]
     if match.slope < 0.05:
         text = (
             f"The course turns {match.slope:.3f} times as fast as the IMU says: its rates seem to be in deg/s, taken for rad/s."

@@ -57,6 +57,7 @@ _INPUT = {
     "time_base": "auto, utc, gps, tai or boot",
     "time_offset_s": "added to the stamps [s]",
     "axes": "where x, y, z point: three of f, b, r, l, u, d (such as frd, flu), or auto",
+    "gyro_axes": "the same of the angular rates where they differ, of either hand; auto: as axes",
     "mounting_deg": "roll, pitch, yaw of the so named axes against the vehicle [deg]",
     "gyro_unit": "auto, rad/s or deg/s",
     "accel_unit": "auto, m/s2 or g",

@@ -71,6 +71,16 @@ def test_a_mirrored_yaw_rate_is_an_error():
     assert find(with_imu(gyro=LOG.imu.gyro * -1), "yaw-sign").level == "error"
 
 
+@pytest.mark.parametrize(("axes", "proposed"), [("frd", "flu"), ("flu", "frd"), ("rbd", "lbu")])
+def test_gyros_that_turn_against_the_forces_get_axes_of_their_own(axes, proposed):
+    timeline = with_imu(gyro=LOG.imu.gyro * [1, -1, -1])
+    told = replace(timeline, provenance=replace(timeline.provenance, recognised=(("input.imu.axes", axes),)))
+    assert f"input.imu.gyro_axes = '{proposed}'" in find(told, "yaw-sign").hint
+    assert "input.imu.gyro_axes" in find(timeline, "yaw-sign").hint
+    codes = [finding.code for finding in preflight(told)]
+    assert "positions-mirrored" not in codes
+
+
 def test_an_x_axis_that_points_right_is_told():
     turned = {name: getattr(LOG.imu, name)[:, [1, 0, 2]] * [1, -1, 1] for name in ("gyro", "accel")}
     finding = find(with_imu(**turned), "forward-axis")

@@ -228,3 +228,19 @@ def test_a_mapping_that_no_file_takes_is_told(tmp_path):
     missing, second = timeline.provenance.damage
     assert "'other*.csv' with the role fix is not used: it fits no file; there is phone.csv" in missing
     assert "comes behind another" in second
+
+
+@pytest.mark.parametrize(("axes", "gyro_axes"), [("frd", "flu"), ("flu", "frd"), ("frd", "fru"), ("frd", "blu")])
+def test_angular_rates_may_have_axes_of_their_own(tmp_path, axes, gyro_axes):
+    write_both(tmp_path / "phone.csv")
+    imu = {"axes": axes, "gyro_axes": gyro_axes}
+    timeline = load_timeline([tmp_path / "phone.csv"], InputSettings.model_validate({"imu": imu}))
+    signs = [[1 if letter in "frd" else -1 for letter in letters] for letters in (gyro_axes, axes)]
+    np.testing.assert_allclose(timeline.imu.gyro[0], np.radians([1, 2, 3]) * signs[0])
+    np.testing.assert_allclose(timeline.imu.accel[0], [0, 0, -9.80665 * signs[1][2]])
+
+
+@pytest.mark.parametrize("letters", ["ffd", "fr", "xyz", "fbd"])
+def test_axes_that_are_no_triad_are_refused(letters):
+    with pytest.raises(ValueError, match="axes"):
+        InputSettings.model_validate({"imu": {"gyro_axes": letters}})
