@@ -123,6 +123,7 @@ def _progress(arguments: argparse.Namespace, total: int) -> Iterator[Any]:
     with tqdm(total=total, unit="run", disable=None, leave=False) as bar:
 
         def tell(values: dict[str, Any]) -> None:
+            """Moves the bar; failures stand above it."""
             if values["event"] == "left out":
                 bar.write(f"{values['drive']}: left out: {values['reason']}", file=sys.stderr)
                 return

@@ -20,6 +20,7 @@ def _offset(by: float) -> Callable[[SyntheticLog], Spoilt]:
     """Stamps of the IMU by so many seconds late."""
 
     def spoil(log: SyntheticLog) -> Spoilt:
+        """Does it."""
         return Spoilt(replace(log, imu=replace(log.imu, t_ns=log.imu.t_ns + round(by * 1e9))))
 
     return spoil
@@ -29,6 +30,7 @@ def _jitter(size: float) -> Callable[[SyntheticLog], Spoilt]:
     """Stamps of the IMU at arrival: exponential delays of mean size [s], in order."""
 
     def spoil(log: SyntheticLog) -> Spoilt:
+        """Does it."""
         rng = np.random.default_rng(log.seed + 73)
         late = np.rint(rng.exponential(size, len(log.imu.t_ns)) * 1e9).astype(np.int64)
         stamps = np.maximum.accumulate(log.imu.t_ns + late) + np.arange(len(late))
@@ -41,6 +43,7 @@ def _gap(start: float, length: float) -> Callable[[SyntheticLog], Spoilt]:
     """Samples of the IMU lost for length [s]."""
 
     def spoil(log: SyntheticLog) -> Spoilt:
+        """Does it."""
         at = seconds(log.imu.t_ns, int(log.imu.t_ns[0]))
         return Spoilt(replace(log, imu=_keep(log.imu, (at < start) | (at >= start + length))), ((start, start + length),))
 
@@ -51,6 +54,7 @@ def _lost(share: float) -> Callable[[SyntheticLog], Spoilt]:
     """A share of the IMU's samples lost here and there."""
 
     def spoil(log: SyntheticLog) -> Spoilt:
+        """Does it."""
         rng = np.random.default_rng(log.seed + 79)
         return Spoilt(replace(log, imu=_keep(log.imu, rng.random(len(log.imu.t_ns)) >= share)))
 

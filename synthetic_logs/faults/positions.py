@@ -27,6 +27,7 @@ def _told(position: float, velocity: float) -> Callable[[SyntheticLog], Spoilt]:
     """Standard deviations told are these factors of the true ones."""
 
     def spoil(log: SyntheticLog) -> Spoilt:
+        """Does it."""
         fixes = _fixes(log)
         told = replace(fixes, cov_pos=fixes.cov_pos * position**2, cov_vel=fixes.cov_vel * velocity**2)
         return Spoilt(replace(log, fixes=told))
@@ -38,6 +39,7 @@ def _slow_errors(size: float, told: float, period: float) -> Callable[[Synthetic
     """Positions that wander by size [m] within period [s], told as told [m]: a receiver's own smoothing of multipath."""
 
     def spoil(log: SyntheticLog) -> Spoilt:
+        """Does it."""
         fixes = _fixes(log)
         phase = 2 * np.pi * seconds(fixes.t_ns, int(fixes.t_ns[0])) / period
         wander = size * np.column_stack([np.sin(phase), np.cos(0.71 * phase + 0.4), np.sin(0.53 * phase + 1.0)])
@@ -51,6 +53,7 @@ def _late(least: float, most: float) -> Callable[[SyntheticLog], Spoilt]:
     """Fixes stamped least to most [s] late: at their arrival over a serial line, in place of their epoch."""
 
     def spoil(log: SyntheticLog) -> Spoilt:
+        """Does it."""
         fixes = _fixes(log)
         rng = np.random.default_rng(log.seed + 71)
         late = np.rint(rng.uniform(least, most, len(fixes)) * 1e9).astype(np.int64)
@@ -71,6 +74,7 @@ def _frozen(start: float, length: float) -> Callable[[SyntheticLog], Spoilt]:
     """The driver goes on publishing the last position (and no velocity) with new stamps for length [s]."""
 
     def spoil(log: SyntheticLog) -> Spoilt:
+        """Does it."""
         fixes = _fixes(log)
         at = seconds(fixes.t_ns, int(fixes.t_ns[0]))
         inside = (at >= start) & (at < start + length)
@@ -86,6 +90,7 @@ def _jump(start: float, length: float, offset: float) -> Callable[[SyntheticLog]
     """A wrong fix: positions off by offset [m] to the north-east for length [s], told as before."""
 
     def spoil(log: SyntheticLog) -> Spoilt:
+        """Does it."""
         fixes = _fixes(log)
         at = seconds(fixes.t_ns, int(fixes.t_ns[0]))
         inside = (at >= start) & (at < start + length)

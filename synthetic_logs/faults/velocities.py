@@ -17,6 +17,7 @@ def _changed(change: Callable[[SyntheticLog, Floats], Floats]) -> Callable[[Synt
     """Velocities as change makes them of (n, 3) NED [m/s]."""
 
     def spoil(log: SyntheticLog) -> Spoilt:
+        """Does it."""
         assert log.fixes is not None
         return Spoilt(replace(log, fixes=replace(log.fixes, vel_n=change(log, log.fixes.vel_n))))
 
@@ -31,6 +32,7 @@ def _late(delay: float) -> Callable[[SyntheticLog, Floats], Floats]:
     """The velocity of delay [s] ago, as a receiver's smoothing gives it."""
 
     def change(log: SyntheticLog, vel_n: Floats) -> Floats:
+        """Velocities (n, 3) NED [m/s] of delay ago."""
         assert log.fixes is not None
         journey, t_ns = log.scenario.journey, log.fixes.t_ns
         then = t_ns - round(delay * 1e9)

@@ -19,17 +19,14 @@ WHOLE = [
 QUICK = WHOLE[::5]
 
 
-def check(drive: str, fault: str | None, folder: Path) -> None:
-    outcome = judge(drive, fault, folder)
-    assert outcome.kept, outcome
-
-
 @pytest.mark.parametrize(("drive", "fault"), QUICK)
 def test_a_solution_is_never_worse_than_its_fixes(drive: str, fault: str | None, tmp_path: Path) -> None:
-    check(drive, fault, tmp_path)
+    outcome = judge(drive, fault, tmp_path)
+    assert outcome.kept, outcome
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("drive", "fault"), WHOLE)
 def test_nor_with_any_fault_of_the_table(drive: str, fault: str | None, tmp_path: Path) -> None:
-    check(drive, fault, tmp_path)
+    outcome = judge(drive, fault, tmp_path)
+    assert outcome.kept, outcome
