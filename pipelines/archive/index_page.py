@@ -20,6 +20,7 @@ _SHOWN = (
     ("method", "method"),
     ("status", "status"),
     ("verdict", "verdict"),
+    ("note", "reason or first finding"),
     ("start_utc", "start UTC"),
     ("duration_s", "duration s"),
     ("distance_m", "distance m"),
@@ -31,7 +32,6 @@ _SHOWN = (
     ("used_share", "used"),
     ("outages", "outages"),
     ("findings", "findings"),
-    ("note", "reason or first finding"),
 )
 _SIZE = 64
 _WIDE, _HIGH = 720, 320

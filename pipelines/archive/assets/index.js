@@ -8,7 +8,7 @@ let shown = rows, drawn = 0, order = { key: "drive", down: false };
 function number(value) {
   if (value === null || value === undefined) return "";
   if (typeof value !== "number") return String(value);
-  return Number.isInteger(value) ? String(value) : value.toPrecision(3).replace(/\.?0+$/, "").replace(/e\+?/, "e");
+  return Number.isInteger(value) ? String(value) : String(Math.abs(value) >= 100 ? Math.round(value) : Number(value.toPrecision(3)));
 }
 
 function line(row) {
