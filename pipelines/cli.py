@@ -209,6 +209,14 @@ def _add_diff(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -
     _add_json(parser)
 
 
+def _add_summary(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    parser = _add_command(
+        commands, "summary", "tell of an archive as a whole: errors over drives and road, outages, what to look at"
+    )
+    parser.add_argument("folder", metavar="DEST", type=Path, help="folder written by 'navreplay batch'")
+    _add_json(parser)
+
+
 _COMMANDS = (
     _add_inspect,
     _add_init,
@@ -220,6 +228,7 @@ _COMMANDS = (
     _add_batch,
     _add_catalog,
     _add_diff,
+    _add_summary,
     _add_filters,
     _add_formats,
 )

@@ -1,5 +1,6 @@
 """The catalogue: conditions, hostile names, many rows, differences, and the archive in Rerun."""
 
+import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -132,6 +133,19 @@ def test_a_lost_drive_comes_first(two_batches: tuple[Path, Path], tmp_path: Path
     write_catalogue(lost, [entries[0], replace(entries[1], status="failed", reason="no")])
     first = compare_archives(two_batches[0], lost).changes[0]
     assert (first.drive, first.what) == (entries[1].drive, "fails now")
+
+
+def test_a_survey_tells_of_all_drives(two_batches: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["summary", str(two_batches[0])]) == 0
+    told = capsys.readouterr().out
+    assert told.startswith("2 drives over ")
+    assert "checked: 2 runs, 2 with a reference" in told
+    assert cli.main(["summary", str(two_batches[0]), "--json"]) == 0
+    values = json.loads(capsys.readouterr().out)
+    (group,) = values["groups"]
+    assert 0 < group["horizontal_rms_m"]["p50"] <= group["horizontal_rms_m"]["p95"] < 5
+    assert {one["drive"] for one in values["look_at"]} == {"drive1", "drive2"}
+    assert cli.main(["summary", str(two_batches[0].parent)]) == 1
 
 
 def test_the_archive_opens_in_rerun(two_batches: tuple[Path, Path]) -> None:
