@@ -1,7 +1,7 @@
 """Formats that can be read, and opening a log by what it holds."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -40,7 +40,7 @@ from importers.text.unix_compress import is_compressed, unpack
 from importers.trajectories.gpx import is_gpx, read_gpx
 from importers.trajectories.sbet import is_sbet, read_sbet
 from navreplay.geodesy.time_scales import LEAP_SECONDS
-from navreplay.plugins import load_plugins
+from navreplay.plugins import load_plugins, told
 from navreplay.timeline import LogError
 
 __all__ = ["FORMATS", "Format", "known_formats", "open_log"]
@@ -62,9 +62,28 @@ class Format:
 def known_formats() -> tuple[Format, ...]:
     """All formats in the order in which they are tried: those here, and behind them those that other packages register under
     `navreplay.formats`. Raises LogError for a plug-in that cannot be loaded."""
+    return (*FORMATS, *_added_formats())
+
+
+def _added_formats() -> list[Format]:
     names = {known.name for known in FORMATS}
-    plugins = (known for known in load_plugins("navreplay.formats", Format) if isinstance(known, Format))
-    return (*FORMATS, *(known for known in plugins if known.name not in names))
+    added = (known for known in load_plugins("navreplay.formats", Format) if isinstance(known, Format))
+    return [replace(known, open=_guarded(known)) for known in added if known.name not in names]
+
+
+def _guarded(added: Format) -> Callable[[str, bytes, InputSettings], Log | None]:
+    """The opener of a plug-in, whose failures are its own."""
+
+    def open_added(path: str, head: bytes, settings: InputSettings) -> Log | None:
+        """See `Format`."""
+        try:
+            return added.open(path, head, settings)
+        except LogError:
+            raise
+        except Exception as error:  # whatever a stranger's module raises, the user is told whose it is
+            raise LogError(f"{path}: the plug-in of format '{added.name}' fails on it: {told(error)}") from error
+
+    return open_added
 
 
 def open_log(path: str | Path, settings: InputSettings | None = None) -> Log:
@@ -100,10 +119,11 @@ def _with_plain_names(settings: InputSettings, packed: str, plain: str) -> Input
 
 
 def _open_plain(name: str, head: bytes, settings: InputSettings) -> Log:
-    for known in known_formats():
-        log = known.open(name, head, settings)
-        if log is not None:
-            return log
+    for formats in (lambda: FORMATS, _added_formats):  # what is read here needs no plug-in, sound or broken
+        for known in formats():
+            log = known.open(name, head, settings)
+            if log is not None:
+                return log
     binary = next((known for known in FORMATS[:3] if Path(name).suffix in known.extensions), None)
     if binary is not None:
         raise LogError(

@@ -10,28 +10,38 @@ from importlib.metadata import EntryPoint, entry_points
 
 from navreplay.timeline import LogError
 
-__all__ = ["load_plugins"]
+__all__ = ["load_plugins", "told"]
 
 
 @cache
-def load_plugins(group: str, kind: type) -> tuple[object, ...]:
-    """The objects of a group, each an instance of kind, in the order of their names. Raises LogError with package and object
-    for one that cannot be loaded, or that is something else."""
-    return tuple(_load(point, kind) for point in sorted(entry_points(group=group), key=lambda point: point.name))
+def load_plugins(group: str, *kinds: type) -> tuple[object, ...]:
+    """The objects of a group, each an instance of one of kinds, in the order of their names. Raises LogError with package and
+    object for one that cannot be loaded, or that is something else."""
+    return tuple(_load(point, kinds) for point in sorted(entry_points(group=group), key=lambda point: point.name))
 
 
-def _load(point: EntryPoint, kind: type) -> object:
-    package = "an unnamed package" if point.dist is None else f"package '{point.dist.name}'"
+def _load(point: EntryPoint, kinds: tuple[type, ...]) -> object:
+    package = _package(point)
     try:
         found = point.load()
-    except Exception as error:  # whatever a stranger's module raises, the user is told whose it is
+    except (Exception, SystemExit) as error:  # whatever a stranger's module raises, the user is told whose it is
         raise LogError(
-            f"plug-in '{point.name}' ({point.value}) of {package} cannot be loaded: {type(error).__name__}: {error}; mend or "
+            f"plug-in '{point.name}' ({point.value}) of {package} cannot be loaded: {told(error)}; mend or "
             "uninstall that package"
         ) from error
-    if not isinstance(found, kind):
+    if not isinstance(found, kinds):
         raise LogError(
-            f"plug-in '{point.name}' ({point.value}) of {package} is no {kind.__name__}; see docs/recipes.md for what "
+            f"plug-in '{point.name}' ({point.value}) of {package} is no {' or '.join(kind.__name__ for kind in kinds)}; see "
+            f"docs/recipes.md for what "
             f"'{point.group}' takes"
         )
     return found
+
+
+def _package(point: EntryPoint) -> str:
+    return "an unnamed package" if point.dist is None else f"package '{point.dist.name}'"
+
+
+def told(error: BaseException) -> str:
+    """What a stranger's code raised, in one line."""
+    return " ".join(f"{type(error).__name__}: {error}".split())

@@ -7,7 +7,7 @@ the whole log, by medians, which faults of single epochs do not move:
     nu_k, the innovation: spread + R.
 Told too small, R is scaled to what d shows, and if measurements are still shut out, to what nu shows: then the errors stay for
 longer than an epoch, and a filter that trusts them less is the honest one. Told too large, R is scaled down, but to no less
-than three times the deviations that d shows and a tenth of those told: a receiver that smooths has errors that stay and d does
+than twice the deviations that d shows and a tenth of those told: a receiver that smooths has errors that stay and d does
 not see, and nobody tells a variance a hundred times too large by chance.
 Assumes: noise whose told size is wrong by one factor per kind, through most of the log.
 Fails: noise that changes in level (see `auto`); a wrong process noise, which is not looked for.
@@ -31,7 +31,7 @@ _LEAST_EPOCHS = 30
 _MEDIAN_OF_SQUARE = 0.4549
 """Median of a squared standard normal variable."""
 _MOST_REJECTED = 0.05
-_MARGIN = 3.0
+_MARGIN = 2.0
 _LEAST_FACTOR = 0.1
 
 

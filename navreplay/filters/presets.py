@@ -161,8 +161,8 @@ PRESETS: dict[str, Preset | BankPreset] = {
 def known_methods() -> dict[str, Preset | BankPreset]:
     """The presets by name, and behind them those that other packages register under `navreplay.filters`; of equal names the one
     here counts. Raises LogError for a plug-in that cannot be loaded."""
-    plugins = (preset for preset in load_plugins("navreplay.filters", Preset) if isinstance(preset, Preset))
-    return {preset.name: preset for preset in plugins} | PRESETS
+    plugins = (one for one in load_plugins("navreplay.filters", Preset, BankPreset) if isinstance(one, Preset | BankPreset))
+    return {one.name: one for one in plugins} | PRESETS
 
 
 def build_method(name: str, parameters: Mapping[str, object] | None = None) -> Method:

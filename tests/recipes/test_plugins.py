@@ -83,6 +83,24 @@ def test_a_broken_plug_in_is_named_with_its_package(
     assert line.count("\n") == 1
 
 
+def test_a_plug_in_that_fails_on_a_file_is_told_and_costs_no_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "careless.py").write_text(
+        "from importers.formats import Format\ndef fail(*_):\n    raise KeyError('two\\nlines')\nBAD = Format('bad', 'x', "
+        "(), fail)\n"
+    )
+    install(tmp_path, monkeypatch, "[navreplay.formats]\nbad = careless:BAD\n")
+    write(simulate(with_duration(SCENARIOS["car-short"], 20.0), 1), tmp_path / "car.mcap")
+    assert cli.main(["inspect", str(tmp_path / "car.mcap")]) == 0
+    (tmp_path / "odd.xyz").write_bytes(b"\x00\x01\x02 nothing known")
+    capsys.readouterr()
+    assert cli.main(["inspect", str(tmp_path / "odd.xyz")]) == 1
+    line = capsys.readouterr().err
+    assert "the plug-in of format 'bad' fails on it: KeyError" in line
+    assert line.count("\n") == 1
+
+
 def test_a_built_in_is_not_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     install(tmp_path, monkeypatch, "[navreplay.filters]\nfixed = half_trust:HALF_TRUST\n")
     assert known_methods()["fixed"] is PRESETS["fixed"]
