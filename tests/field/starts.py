@@ -90,7 +90,9 @@ def main() -> None:
     for way, pairs in [*ways.items(), ("all", [(error, std) for _, error, std, _ in starts])]:
         error, std = np.array(pairs).T
         nees = float(np.mean((error / std) ** 2))
-        print(f"{way:<18} {len(pairs):>4}  NEES {nees:6.2f}  error {np.degrees(np.sqrt(np.mean(error**2))):6.2f} deg rms", end="")
+        print(
+            f"{way:<18} {len(pairs):>4}  NEES {nees:6.2f}  error {np.degrees(np.sqrt(np.mean(error**2))):6.2f} deg rms", end=""
+        )
         print(f"  told {np.degrees(np.sqrt(np.mean(std**2))):6.2f}  largest {np.degrees(np.abs(error).max()):6.2f}")
 
 
