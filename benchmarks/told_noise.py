@@ -73,7 +73,7 @@ def main() -> None:
 
 
 def show_drive(name: str, config: Path, logs: list[Path], settings: list[str]) -> None:
-    """Two lines of the table: over the error of the fixes, or where those are the reference over that with the noise as told."""
+    """Two lines of the table: over the error of the fixes or, where those are the reference, as told."""
     settings = [*settings, "output.recording=false"]
     drive = read_drive(logs, load_config(config, settings))
     for kind in ("position", "velocity"):

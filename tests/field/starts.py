@@ -2,9 +2,8 @@
 
     python -m tests.field.starts [--starts 100]
 
-Every start is drawn by its number: the way the vehicle begins (standing, standing and backing out, rolling slowly, driving, in a
-turn, backing), its course, speed, grade of IMU, rate of the fixes, with and without velocities. The first 60 s of a drive are
-filtered by the default method.
+By its number each start is drawn: how the vehicle begins (standing, backing out, rolling slowly, driving, in a turn, backing),
+its course, speed, grade of IMU, rate of the fixes, with and without velocities. The default method filters its first 60 s.
 """
 
 import argparse
