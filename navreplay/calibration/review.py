@@ -5,6 +5,7 @@ the whole log, by medians, which faults of single epochs do not move:
     d_k = z_k - leftover_k-1, the change between epochs that the inertial sensors did not see: 2 R and what they drift by in
           between, whatever the filter believes of R (the differences of Ge et al., Sensors 20 (2020) 6041, section 3);
     nu_k, the innovation: spread + R.
+Of ranges, what all of an epoch share (the receiver clock) is taken from both by a median over its satellites.
 Told too small, R is scaled to what d shows, and if measurements are still shut out, to what nu shows: then the errors stay for
 longer than an epoch, and a filter that trusts them less is the honest one. Told too large, R is scaled down, but to no less
 than twice the deviations that d shows and a tenth of those told: a receiver that smooths has errors that stay and d does
@@ -22,11 +23,14 @@ import numpy as np
 from navreplay.calibration.settled import Settled
 from navreplay.options import FilterOptions
 from navreplay.solution import InnovationSeries, Solution
-from navreplay.timeline import Floats
+from navreplay.timeline import Floats, Times
 
 __all__ = ["Review"]
 
 _SCALES = {"position": "position_noise_scale", "velocity": "velocity_noise_scale"}
+_RANGE_SCALES = {"range": "pseudorange_noise_scale", "range_rate": "range_rate_noise_scale"}
+_LEAST_SATELLITES = 4
+"""At an epoch, for a median over them to be their clock."""
 _LEAST_EPOCHS = 30
 _MEDIAN_OF_SQUARE = 0.4549
 """Median of a squared standard normal variable."""
@@ -49,7 +53,7 @@ class Review:
         factors: dict[str, float] = {}
         reasons = []
         for series in solution.innovations:
-            if series.kind not in _SCALES or len(series.t_ns) < _LEAST_EPOCHS or series.step is None:
+            if series.kind not in _SCALES | _RANGE_SCALES or series.step is None or _count_epochs(series) < _LEAST_EPOCHS:
                 continue
             factor, reason = self._factor(series)
             if factor > 1.0 or (factor < 1.0 and not amended):
@@ -57,16 +61,21 @@ class Review:
                 reasons.append(reason)
         if not factors:
             return None
-        scales = {_SCALES[kind]: getattr(options, _SCALES[kind]) * factor for kind, factor in factors.items()}
-        return Settled(replace(options, **scales), None, scales, tuple(reasons))
+        scaled, scales = _scale(options, factors)
+        return Settled(scaled, None, scales, tuple(reasons))
 
     def _factor(self, series: InnovationSeries) -> tuple[float, str]:
         """Of the standard deviations of a kind, 1 where they are borne out, and the sentence that tells it."""
         assert series.step is not None
         rejected = 1 - float(np.mean(series.used))
         noise = np.square(series.noise_std)
-        by_step = sqrt(_ratio(np.square(series.step), 2 * noise))
-        by_innovation = sqrt(_ratio(np.square(series.residual) - (np.square(series.std) - noise), noise))
+        if series.sources:
+            step, innovation = (_without_clock(series.t_ns, values[:, 0])[:, None] for values in (series.step, series.residual))
+            by_innovation = sqrt(_ratio(np.square(innovation), noise))
+        else:
+            step = series.step
+            by_innovation = sqrt(_ratio(np.square(series.residual) - (np.square(series.std) - noise), noise))
+        by_step = sqrt(_ratio(np.square(step), 2 * noise))
         text = f"{series.kind}: "
         if rejected > _MOST_REJECTED:
             text += f"{100 * rejected:.0f} % were rejected; "
@@ -84,6 +93,33 @@ class Review:
                 f"{cautious:.3g} times that is taken"
             )
         return 1.0, ""
+
+
+def _count_epochs(series: InnovationSeries) -> int:
+    return len(np.unique(series.t_ns)) if series.sources else len(series.t_ns)
+
+
+def _scale(options: FilterOptions, factors: dict[str, float]) -> tuple[FilterOptions, dict[str, float]]:
+    """Options with the standard deviations of kinds times factors, and the scales that these then are."""
+    fixes = {_SCALES[kind]: getattr(options, _SCALES[kind]) * by for kind, by in factors.items() if kind in _SCALES}
+    ranges = {
+        _RANGE_SCALES[kind]: getattr(options.ranges, _RANGE_SCALES[kind]) * by
+        for kind, by in factors.items()
+        if kind in _RANGE_SCALES
+    }
+    return replace(options, **fixes, ranges=replace(options.ranges, **ranges)), fixes | ranges
+
+
+def _without_clock(t_ns: Times, values: Floats) -> Floats:
+    """values (k,) less the median of their epoch, as large as their noise was before; NaN at epochs of few satellites."""
+    known = np.flatnonzero(np.isfinite(values))
+    order = known[np.lexsort((values[known], t_ns[known]))]
+    _, starts, epoch, counts = np.unique(t_ns[order], return_index=True, return_inverse=True, return_counts=True)
+    low, high = order[starts + (counts - 1) // 2], order[starts + counts // 2]
+    median = np.where(counts >= _LEAST_SATELLITES, (values[low] + values[high]) / 2, np.nan)
+    left = np.full(len(values), np.nan)
+    left[order] = (values[order] - median[epoch]) * np.sqrt(counts / np.maximum(counts - 1, 1))[epoch]
+    return left
 
 
 def _ratio(square: Floats, variance: Floats) -> float:

@@ -14,7 +14,7 @@ from scipy.special import chdtri
 from navreplay.options import GateOptions
 from navreplay.timeline import Floats
 from navreplay.update.gaussian import Innovation, solve
-from navreplay.update.record import JudgedRows, Recorder
+from navreplay.update.record import JudgedRows, Recorder, step_of
 from navreplay.update.reopening import Widening
 
 __all__ = ["RangeGate", "RangeVerdict"]
@@ -33,6 +33,7 @@ class RangeVerdict(NamedTuple):
         told = np.diagonal(noise)
         total = np.diagonal(innovation.spread) + told
         nominal = np.diagonal(innovation.noise)
+        step = step_of(innovation)
         ranges = kinds.count("range")
         for kind, part in (("range", slice(0, ranges)), ("range_rate", slice(ranges, len(kinds)))):
             if part.start < part.stop:
@@ -43,6 +44,7 @@ class RangeVerdict(NamedTuple):
                     told[part],
                     nominal[part],
                     self.reasons[part],
+                    step[part],
                 )
                 recorder.add_rows(t_ns, kind, rows)
 

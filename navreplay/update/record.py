@@ -9,7 +9,7 @@ from navreplay.solution import Event, InnovationSeries, WeightSeries
 from navreplay.timeline import Floats
 from navreplay.update.gaussian import Innovation
 
-__all__ = ["Judged", "JudgedRows", "Recorder"]
+__all__ = ["Judged", "JudgedRows", "Recorder", "step_of"]
 
 _UNITS = {
     "position": "m",
@@ -36,7 +36,7 @@ class Judged:
 @dataclass(frozen=True, eq=False, slots=True)
 class JudgedRows:
     """One kind's components at an epoch, each judged by itself: labels, residuals, variances of prediction and measurement
-    together, of the noise used and of the noise told, and reasons, each (m,)."""
+    together, of the noise used and of the noise told, reasons, and steps since the epoch before, each (m,)."""
 
     labels: tuple[str, ...]
     residual: Floats
@@ -44,9 +44,10 @@ class JudgedRows:
     noise: Floats
     nominal: Floats
     reasons: tuple[str, ...]
+    step: Floats
 
 
-def _step(innovation: Innovation) -> Floats:
+def step_of(innovation: Innovation) -> Floats:
     """(m,) residual less that of the epoch before, NaN where it had none."""
     before = {} if innovation.leftover is None else innovation.leftover.residual
     return np.asarray(innovation.residual - [before.get(label, np.nan) for label in innovation.labels])
@@ -110,7 +111,7 @@ class Recorder:
             nis=np.array([row.nis for row in rows]),
             used=np.array([not row.reason for row in rows]),
             reason=tuple(row.reason for row in rows),
-            step=np.array([_step(innovation) for innovation in innovations]),
+            step=np.array([step_of(innovation) for innovation in innovations]),
         )
 
     def _series_of_rows(self, kind: str) -> InnovationSeries:
@@ -132,4 +133,5 @@ class Recorder:
             used=np.array([not reason for reason in reasons]),
             reason=reasons,
             sources=tuple(label.removeprefix(f"{kind} ") for epoch in epochs for label in epoch.labels),
+            step=np.concatenate([epoch.step for epoch in epochs])[:, None],
         )
