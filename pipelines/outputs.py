@@ -33,11 +33,11 @@ _LONGEST_NAMES = 60
 """Names of runs that a title holds [characters]."""
 
 
-def write_outputs(result: RunResult, out_dir: str | Path, recording: str | None = None) -> dict[str, Path]:
+def write_outputs(result: RunResult, out_dir: str | Path, layer: tuple[str, str] | None = None) -> dict[str, Path]:
     """Writes solution.csv, report.json, report.md, report.html, config.toml, config.estimated.toml where the method estimated
     noise from the whole log, launch.csv in the launch-inertial frame, and, unless the configuration says otherwise,
-    recording.rrd; recording: its identity, that of files and configuration where it is None (recordings of one identity are
-    layers of one segment in a catalogue). Returns the paths by name. Raises LogError when the folder cannot be written."""
+    recording.rrd; layer: the segment of a catalogue that the recording belongs to and its name there (see
+    `write_recording`). Returns the paths by name. Raises LogError when the folder cannot be written."""
     report = build_report(result)
     title, subtitle = _title(result)
     figures, tables, notice = headline_figures(report), report_tables(report), verdict_notice(report["verdict"])
@@ -59,7 +59,7 @@ def write_outputs(result: RunResult, out_dir: str | Path, recording: str | None 
     if result.config.output.recording:
         from pipelines.recording.view import write_recording  # loading rerun takes a second, and not every run records
 
-        writers["recording.rrd"] = lambda path: write_recording(path, result, recording)
+        writers["recording.rrd"] = lambda path: write_recording(path, result, layer)
     return _write_files(Path(out_dir), writers)
 
 

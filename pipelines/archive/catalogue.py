@@ -8,18 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from navreplay.evaluation.statistics import compute_nis
-from navreplay.geodesy.earth import ned_between
 from navreplay.timeline import Floats, LogError
 from pipelines.archive.manifest import Entry
-from pipelines.drive.result import RunResult
+from pipelines.drive.headline import FIGURES
 from pipelines.files.whole_file import write_whole
-from pipelines.trajectory.solution_csv import utc_text
 
 if TYPE_CHECKING:
     import pandas
 
-__all__ = ["COLUMNS", "describe", "read_catalogue", "select_rows", "track_of", "write_catalogue"]
+__all__ = ["COLUMNS", "read_catalogue", "select_rows", "track_of", "write_catalogue"]
 
 NAME = "catalog.parquet"
 _TRACK_POINTS = 60
@@ -29,31 +26,8 @@ COLUMNS: dict[str, str] = {
     "method": "str",
     "status": "str",
     "reason": "str",
-    "verdict": "str",
     "vehicle": "str",
-    "start_utc": "str",
-    "duration_s": "float",
-    "distance_m": "float",
-    "lat_deg": "float",
-    "lon_deg": "float",
-    "imu_hz": "float",
-    "gnss_hz": "float",
-    "gnss": "str",
-    "used_share": "float",
-    "horizontal_rms_m": "float",
-    "horizontal_p95_m": "float",
-    "horizontal_max_m": "float",
-    "height_rms_m": "float",
-    "position_nees": "float",
-    "position_nis": "float",
-    "std_horizontal_m": "float",
-    "outages": "int",
-    "outage_s": "float",
-    "longest_outage_s": "float",
-    "outage_end_median_m": "float",
-    "findings": "int",
-    "first_finding": "str",
-    "warnings": "int",
+    **FIGURES,
     "inputs": "str",
     "config": "str",
     "code": "str",
@@ -61,67 +35,6 @@ COLUMNS: dict[str, str] = {
     "bytes": "int",
 }
 """Columns with their types. inputs, config and code are the hashes of the manifest."""
-
-
-def describe(result: RunResult, vehicle: str) -> dict[str, Any]:
-    """What the catalogue says of a run, unknown figures None; track: thinned, (k, 2) degrees."""
-    solution, timeline = result.solution, result.timeline
-    steps = np.linalg.norm(ned_between(solution.lla[:-1], solution.lla[1:])[:, :2], axis=1)
-    aiding = timeline.ranges if timeline.ranges is not None else timeline.fixes
-    used = np.concatenate([series.used for series in solution.innovations]) if solution.innovations else np.ones(0)
-    nis = compute_nis(solution.innovations)
-    lasting = [(outage.end_ns - outage.start_ns) / 1e9 for outage in solution.outages]
-    warnings = sum(event.level == "warning" for event in solution.events)
-    row: dict[str, Any] = {
-        "verdict": result.verdict.grade,
-        "vehicle": vehicle,
-        "start_utc": utc_text(solution.t_ns[:1])[0],
-        "duration_s": (int(solution.t_ns[-1]) - int(solution.t_ns[0])) / 1e9,
-        "distance_m": float(steps.sum()),
-        "lat_deg": float(np.degrees(solution.lla[0, 0])),
-        "lon_deg": float(np.degrees(solution.lla[0, 1])),
-        "imu_hz": None if timeline.imu is None else _rate(timeline.imu.t_ns),
-        "gnss_hz": None if aiding is None else _rate(np.unique(aiding.t_ns)),
-        "gnss": "ranges" if timeline.ranges is not None else "fixes" if timeline.fixes is not None else "",
-        "used_share": float(used.mean()) if len(used) else None,
-        "position_nis": _mean(nis.get("position") or nis.get("range")),
-        "std_horizontal_m": float(np.median(np.hypot(solution.std[:, 0], solution.std[:, 1]))),
-        "outages": len(lasting),
-        "outage_s": float(sum(lasting)),
-        "longest_outage_s": max(lasting, default=None),
-        "findings": sum(finding.level != "info" for finding in result.findings),
-        "first_finding": next((f.text for f in result.findings if f.level != "info"), ""),
-        "warnings": warnings,
-        "track": track_of(np.degrees(solution.lla[:, :2])),
-        **_errors(result),
-    }
-    return {name: None if isinstance(value, float) and not np.isfinite(value) else value for name, value in row.items()}
-
-
-def _errors(result: RunResult) -> dict[str, Any]:
-    evaluation = result.evaluation
-    if evaluation is None:
-        return {}
-    outside = evaluation.statistics.get("outside") or evaluation.statistics["all"]
-    position = outside.get("position") or evaluation.statistics["all"]["position"]
-    horizontal, down = position["horizontal"], position["down"]
-    ends = [float(one.end_horizontal) for one in evaluation.outages if getattr(one, "end_horizontal", None) is not None]
-    return {
-        "horizontal_rms_m": horizontal.rms,
-        "horizontal_p95_m": horizontal.p95,
-        "horizontal_max_m": horizontal.max,
-        "height_rms_m": down.rms,
-        "position_nees": _mean(evaluation.nees.get("position")),
-        "outage_end_median_m": float(np.median(ends)) if ends else None,
-    }
-
-
-def _mean(judged: Any) -> float | None:
-    return None if judged is None else float(judged.mean)
-
-
-def _rate(t_ns: np.ndarray) -> float | None:
-    return None if len(t_ns) < 2 else round(1e9 / float(np.median(np.diff(t_ns))), 2)
 
 
 def track_of(degrees: Floats) -> list[list[float]]:

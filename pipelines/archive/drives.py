@@ -1,23 +1,21 @@
 """Which files of an archive are one drive, and why."""
 
-import os
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from importers.formats import known_formats, open_log
-from importers.roles.messages import kind_of
-from importers.rows.log import Log
 from importers.settings import InputSettings
 from navreplay.timeline import LogError
+from pipelines.archive.spans import AIDS, Span, roles_of, shared_time, time_span
 
-__all__ = ["ArchiveDrive", "find_drives", "list_files"]
+__all__ = ["ArchiveDrive", "find_drives"]
 
 _REFERENCE = re.compile(r"(^|[._-])(truth|reference|ref|groundtruth|ground_truth)($|[._-])", re.IGNORECASE)
 _SPLIT = re.compile(r"[._-]?(\d+)$")
-_LISTS = (".lst", ".list")
-_AIDS = frozenset({"fix", "range", "attitude"})
+_SPLIT_GAP_NS, _SPLIT_OVERLAP_NS = 60 * 10**9, 5 * 10**9
+"""Recorders begin the next file at once; buffers may overlap a little."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,68 +37,44 @@ class ArchiveDrive:
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """A log of an archive. roles: what its channels can serve as."""
+    """A log of an archive. roles: what its channels can serve as. span: its first and last time [ns], None where unknown."""
 
     path: Path
     roles: frozenset[str]
+    span: Span | None = None
 
     @property
     def complete(self) -> bool:
         """Whether it is a drive by itself."""
-        return "imu" in self.roles and bool(self.roles & _AIDS)
+        return "broken" in self.roles or ("imu" in self.roles and bool(self.roles & AIDS))
+
+    @property
+    def stem(self) -> str:
+        """The name's first part."""
+        return self.path.name.split(".")[0]
 
 
-def list_files(sources: Sequence[str], match: str = "*") -> list[Path]:
-    """The logs below folders, that patterns find, that list files name; bag folders as one. Raises LogError for a source that
-    is not there. Links that lead round in a circle are followed once."""
-    found: dict[Path, None] = {}
-    for source in sources:
-        for path in _expand(source):
-            if path.match(match) and not path.name.startswith("."):
-                found.setdefault(path)
-    return sorted(found)
+@dataclass(slots=True)
+class _Group:
+    """Files that become one drive."""
 
+    name: str
+    parts: list[_Part]
+    why: str
 
-def _expand(source: str) -> Iterable[Path]:
-    path = Path(source)
-    if path.suffix in _LISTS and path.is_file():
-        for line in path.read_text(encoding="utf-8").splitlines():
-            if line.strip() and not line.startswith("#"):
-                yield from _expand(str(path.parent / line.strip()))
-    elif path.is_dir():
-        yield from _walk(path)
-    elif path.exists():
-        yield path
-    elif any(letter in source for letter in "*?["):
-        base = Path(path.anchor) if path.is_absolute() else Path()
-        yield from (one for one in base.glob(str(path.relative_to(path.anchor))) if one.is_file())
-    else:
-        raise LogError(f"{source}: there is no such file, folder or pattern; name the archive's folder, logs, or a list (.lst)")
-
-
-def _walk(folder: Path) -> Iterable[Path]:
-    seen: set[str] = set()
-    for root, folders, names in os.walk(folder, followlinks=True):
-        real = os.path.realpath(root)
-        if real in seen:
-            folders.clear()
-            continue
-        seen.add(real)
-        folders.sort()
-        here = Path(root)
-        if (here / "metadata.yaml").exists() or any(name.endswith(".db3") for name in names):
-            folders.clear()
-            yield here
-            continue
-        yield from (here / name for name in sorted(names))
+    @property
+    def span(self) -> Span | None:
+        """From the first to the last of its times, None where none is known."""
+        known = [part.span for part in self.parts if part.span is not None]
+        return (min(first for first, _ in known), max(last for _, last in known)) if known else None
 
 
 def find_drives(files: Sequence[Path], root: Path, settings: InputSettings) -> tuple[list[ArchiveDrive], dict[Path, str]]:
     """The drives that files make, their names relative to root, and what is no log with the reason.
 
-    A file that holds an IMU and something that aids it is a drive by itself; splits of one recording (a number at the end of
-    the same name) are one; what else lies in a folder is joined by the first part of its name, or goes with the folder's only
-    drive.
+    A file that holds an IMU and something that aids it is a drive by itself; files of one name that count on and follow each
+    other in time are splits of one; what else lies in a folder is joined by the first part of its name, else by the time it
+    shares with one drive alone.
     """
     parts, references, others = _sort(files, settings)
     by_folder: dict[Path, list[_Part]] = {}
@@ -123,7 +97,8 @@ def _sort(files: Sequence[Path], settings: InputSettings) -> tuple[list[_Part], 
             others[path] = "no extension of a log"
             continue
         try:
-            roles = _roles(open_log(path, settings))
+            log = open_log(path, settings)
+            roles = roles_of(log)
         except LogError as error:
             if path.suffix.lower() in (".csv", ".txt", ".mat") and "unknown format" in str(error):
                 others[path] = "a table without a mapping"
@@ -133,62 +108,112 @@ def _sort(files: Sequence[Path], settings: InputSettings) -> tuple[list[_Part], 
         if _REFERENCE.search(path.stem) or roles == {"reference"}:
             references.append(path)
         elif roles:
-            parts.append(_Part(path, roles))
+            parts.append(_Part(path, roles, time_span(log)))
         else:
             others[path] = "nothing in it serves navigation"
     return parts, references, others
 
 
-def _roles(log: Log) -> frozenset[str]:
-    roles: set[str] = set()
-    for channel in log.channels():
-        kind = kind_of(channel)
-        if kind is not None and kind.automatic:
-            roles.add(kind.roles[0])
-    return frozenset(roles)
-
-
 def _join(folder: Path, parts: Sequence[_Part], references: Sequence[Path], root: Path) -> list[ArchiveDrive]:
     """The drives of one folder."""
-    whole: dict[str, list[Path]] = {}
-    for part in parts:
-        if part.complete or "broken" in part.roles:
-            whole.setdefault(_split_name(part.path), []).append(part.path)
-    rest = [part.path for part in parts if not part.complete and "broken" not in part.roles]
-    groups: list[tuple[str, list[Path], str]] = [
-        (name, sorted(paths, key=_split_number), "holds IMU and GNSS" if len(paths) == 1 else "splits of one recording")
-        for name, paths in sorted(whole.items())
-    ]
-    if len(groups) == 1:
-        name, paths, why = groups[0]
-        groups = [(name, paths + rest, f"{why}; the other files of its folder go with it" if rest else why)]
-    else:
-        by_stem: dict[str, list[Path]] = {}
-        for path in rest:
-            by_stem.setdefault(path.name.split(".")[0], []).append(path)
-        if not groups and len(by_stem) > 1 and all(len(paths) == 1 for paths in by_stem.values()):
-            by_stem = {folder.name or "drive": rest}
-        groups += [(stem, paths, "files of one name" if len(paths) > 1 else "alone") for stem, paths in sorted(by_stem.items())]
-    named = [(name, paths, why, _reference_of(name, references, len(groups) == 1)) for name, paths, why in groups]
+    groups = _splits([part for part in parts if part.complete])
+    rest = _join_names(groups, [part for part in parts if not part.complete])
+    if not groups and len(rest) > 1 and len({part.stem for part in rest}) == len(rest):
+        groups, rest = [_Group(folder.name or "drive", rest[:1], "the files of its folder")], rest[1:]
+    _join_rest(groups, rest)
     place = "" if folder == root or root not in folder.parents else f"{folder.relative_to(root)}/"
-    return [ArchiveDrive(_safe(place + name), tuple(paths), reference, why) for name, paths, why, reference in named]
+    return [
+        ArchiveDrive(
+            *(_safe(place + group.name), tuple(part.path for part in group.parts)),
+            *(_reference_of(group, references, len(groups) == 1), group.why),
+        )
+        for group in sorted(groups, key=lambda one: one.name)
+    ]
 
 
-def _reference_of(name: str, references: Sequence[Path], only: bool) -> Path | None:
-    own = [path for path in references if path.name.split(".")[0].startswith(name)]
+def _splits(parts: Sequence[_Part]) -> list[_Group]:
+    """Complete logs, those that count on under one name and follow each other in time as one."""
+    by_name: dict[str, list[_Part]] = {}
+    for part in parts:
+        by_name.setdefault(_SPLIT.sub("", part.stem) or part.stem, []).append(part)
+    groups: list[_Group] = []
+    for name, same in sorted(by_name.items()):
+        chains: list[list[_Part]] = []
+        for part in sorted(same, key=_split_number):
+            if chains and _follows(chains[-1][-1], part):
+                chains[-1].append(part)
+            else:
+                chains.append([part])
+        for chain in chains:
+            if len(chain) == 1:
+                groups.append(_Group(chain[0].stem, chain, "holds IMU and GNSS"))
+            else:
+                groups.append(_Group(name if len(chains) == 1 else chain[0].stem, chain, "splits of one recording"))
+    return groups
+
+
+def _follows(earlier: _Part, later: _Part) -> bool:
+    if earlier.span is None or later.span is None or earlier.path.suffix != later.path.suffix:
+        return False
+    return -_SPLIT_OVERLAP_NS <= later.span[0] - earlier.span[1] <= _SPLIT_GAP_NS
+
+
+def _join_names(groups: list[_Group], rest: Sequence[_Part]) -> list[_Part]:
+    """Adds files to the group of their name, makes groups of those that share a name, and returns the others."""
+    by_stem: dict[str, list[_Part]] = {}
+    for part in rest:
+        by_stem.setdefault(part.stem, []).append(part)
+    alone = []
+    for stem, same in sorted(by_stem.items()):
+        group = next((one for one in groups if stem in {one.name, *(part.stem for part in one.parts)}), None)
+        if group is not None:
+            group.parts += same
+            group.why += "; files of its name go with it"
+        elif len(same) > 1:
+            groups.append(_Group(stem, same, "files of one name"))
+        else:
+            alone += same
+    return alone
+
+
+def _join_rest(groups: list[_Group], rest: Sequence[_Part]) -> None:
+    """Adds each file to the group whose time it shares, to the folder's only group where times are unknown, or alone."""
+    only = groups[0] if len(groups) == 1 else None
+    made: list[_Group] = []
+    for part in rest:
+        group = _of_its_time(groups, part)
+        if group is not None:
+            words = "files of its time go with it"
+        elif only is not None and (part.span is None or only.span is None):
+            group, words = only, "the other files of its folder go with it"
+        if group is None:
+            made.append(_Group(part.stem, [part], "alone"))
+        else:
+            group.parts.append(part)
+            group.why += "" if words in group.why else f"; {words}"
+    groups += made
+
+
+def _of_its_time(groups: Sequence[_Group], part: _Part) -> _Group | None:
+    """The group that shares the part's time; None where none does, or another does nearly as long."""
+    shared = [(0 if part.span is None or one.span is None else shared_time(part.span, one.span), one) for one in groups]
+    ordered = sorted(shared, key=lambda pair: -pair[0])
+    if not ordered or not ordered[0][0] or (len(ordered) > 1 and ordered[1][0] > 0.5 * ordered[0][0]):
+        return None
+    return ordered[0][1]
+
+
+def _reference_of(group: _Group, references: Sequence[Path], only: bool) -> Path | None:
+    names = {group.name, *(part.stem for part in group.parts)}
+    own = [path for path in references if _REFERENCE.sub("", path.name.split(".")[0]).rstrip("._-") in names]
     if not own and only and len(references) == 1:
         own = list(references)
     return own[0] if len(own) == 1 else None
 
 
-def _split_name(path: Path) -> str:
-    stem = path.name.split(".")[0]
-    return _SPLIT.sub("", stem) or stem if path.suffix in (".mcap", ".db3") else stem
-
-
-def _split_number(path: Path) -> tuple[int, str]:
-    number = _SPLIT.search(path.name.split(".")[0])
-    return (int(number.group(1)) if number else -1, path.name)
+def _split_number(part: _Part) -> tuple[int, str]:
+    number = _SPLIT.search(part.stem)
+    return (int(number.group(1)) if number else -1, part.path.name)
 
 
 def _safe(name: str) -> str:

@@ -6,13 +6,15 @@ import shutil
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from navreplay.timeline import LogError
-from pipelines.archive.catalogue import describe
+from pipelines.archive.catalogue import track_of
 from pipelines.config.spec import Config
+from pipelines.drive.headline import headline
 from pipelines.drive.process import Drive, filter_drive, read_drive
 from pipelines.outputs import write_outputs
 
@@ -60,13 +62,13 @@ def _run_method(job: Job, drive: Drive, method: str, config: Config, reading: fl
         filtered = time.perf_counter()
         # seconds differ from run to run, and the tree must not
         result = replace(result, timing_s={})
-        identity = sha256(job.drive.encode()).hexdigest()[:32]
-        _write_whole(Path(job.folder) / method, lambda folder: write_outputs(result, folder, recording=identity))
+        _write_whole(Path(job.folder) / method, lambda folder: write_outputs(result, folder, layer=(job.drive, method)))
         written = time.perf_counter()
     except (LogError, OSError, MemoryError) as error:
         return Outcome(method, _reason(error), {}, {})
     timing = {"reading": reading, "filtering": filtered - started, "writing": written - filtered}
-    return Outcome(method, "", describe(result, job.vehicle), timing)
+    row = {"vehicle": job.vehicle, **headline(result), "track": track_of(np.degrees(result.solution.lla[:, :2]))}
+    return Outcome(method, "", row, timing)
 
 
 def _reason(error: BaseException) -> str:

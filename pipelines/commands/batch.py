@@ -13,8 +13,9 @@ from typing import Any
 from navreplay.filters.presets import build_method
 from navreplay.timeline import LogError
 from pipelines.archive.batch import Plan, Summary, plan_batch, run_batch
-from pipelines.archive.drives import find_drives, list_files
+from pipelines.archive.drives import find_drives
 from pipelines.archive.executors import choose_executor
+from pipelines.archive.listing import list_files
 from pipelines.archive.rules import Assigned, assign, read_rules
 from pipelines.commands.options import read_config
 

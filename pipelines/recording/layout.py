@@ -20,8 +20,8 @@ class Stack(NamedTuple):
     unit: str
 
 
-def _arrange(stack: Stack, whole: rr.TimeRange) -> rrb.Vertical:
-    plots = [(label, f"{stack.origin}/{label}") for label in stack.labels] or [(stack.name, stack.origin)]
+def _arrange(stack: Stack, whole: rr.TimeRange, under: str) -> rrb.Vertical:
+    plots = [(label, f"{under}{stack.origin}/{label}") for label in stack.labels] or [(stack.name, f"{under}{stack.origin}")]
     views = [
         rrb.TimeSeriesView(
             name=f"{name} [{stack.unit}]" if stack.unit else name,
@@ -35,29 +35,32 @@ def _arrange(stack: Stack, whole: rr.TimeRange) -> rrb.Vertical:
 
 
 def build_layout(
-    stacks: tuple[Stack, ...], duration_s: float, eye: Point, target: Point, zoom: float, sky: bool
+    stacks: tuple[Stack, ...], duration_s: float, eye: Point, target: Point, zoom: float, sky: bool, under: str = ""
 ) -> rrb.Blueprint:
     """duration_s: of the drive, all of which the plots show. eye, target [m]: where the 3-D view looks from and at, as east,
-    north, up. zoom: of the map, in web Mercator levels. sky: whether there are satellites to show."""
+    north, up. zoom: of the map, in web Mercator levels. sky: whether there are satellites to show. under: entity that
+    all others lie under."""
     margin = 0.02 * duration_s
     whole = rr.TimeRange(
         start=rr.TimeRangeBoundary.absolute(seconds=-margin), end=rr.TimeRangeBoundary.absolute(seconds=duration_s + margin)
     )
     track = rrb.Spatial3DView(
         name="Track (east, north, up)",
-        origin="/local",
+        origin=f"{under}/local",
         eye_controls=rrb.EyeControls3D(position=eye, look_target=target, eye_up=(0.0, 0.0, 1.0)),
         line_grid=rrb.LineGrid3D(visible=True),
     )
-    chart = rrb.MapView(name="Map", origin="/map", zoom=zoom, background=rrb.MapProvider.OpenStreetMap)
+    chart = rrb.MapView(name="Map", origin=f"{under}/map", zoom=zoom, background=rrb.MapProvider.OpenStreetMap)
     bounds = rrb.VisualBounds2D(x_range=(-1.2, 1.2), y_range=(-1.2, 1.2))
     overhead = (
-        [rrb.Spatial2DView(name="Sky (north up, horizon at the rim)", origin="/sky", visual_bounds=bounds)] if sky else []
+        [rrb.Spatial2DView(name="Sky (north up, horizon at the rim)", origin=f"{under}/sky", visual_bounds=bounds)]
+        if sky
+        else []
     )
-    plots = rrb.Tabs(contents=[_arrange(stack, whole) for stack in stacks], active_tab=0, name="Plots")
+    plots = rrb.Tabs(contents=[_arrange(stack, whole, under) for stack in stacks], active_tab=0, name="Plots")
     columns = [rrb.encodings.TextLogColumn(kind, visible=kind != "entitypath") for kind in ("entitypath", "loglevel", "body")]
-    events = rrb.TextLogView(name="Events", origin="/events", columns=rrb.TextLogColumns(text_log_columns=columns))
-    verdict = rrb.TextDocumentView(name="Verdict", origin="/verdict")
+    events = rrb.TextLogView(name="Events", origin=f"{under}/events", columns=rrb.TextLogColumns(text_log_columns=columns))
+    verdict = rrb.TextDocumentView(name="Verdict", origin=f"{under}/verdict")
     return rrb.Blueprint(
         rrb.Horizontal(
             rrb.Vertical(track, rrb.Horizontal(chart, *overhead), row_shares=[3, 2]),

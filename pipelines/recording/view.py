@@ -13,6 +13,7 @@ from navreplay.geodesy.rotation import enu_from_ned, frd_ned_from_flu_enu, quat_
 from navreplay.solution import Solution
 from navreplay.timeline import FixStatus, Floats
 from pipelines.drive.result import RunResult
+from pipelines.recording.layer import LayerStream, send_outages, send_properties
 from pipelines.recording.layout import build_layout
 from pipelines.recording.paint import BLUE, GREY, PALE, RED, time_columns
 from pipelines.recording.series import list_stacks, send_biases, send_errors, send_innovations, send_weights
@@ -45,17 +46,21 @@ def recording_id(result: RunResult) -> str:
     return digest.hexdigest()[:32]
 
 
-def write_recording(path: Path, result: RunResult, identity: str | None = None) -> None:
-    """Writes the recording with its layout. identity: of the recording, where it is not that of files and configuration."""
+def write_recording(path: Path, result: RunResult, layer: tuple[str, str] | None = None) -> None:
+    """Writes the recording with its layout. layer: the segment that it belongs to and its name there; its entities then lie
+    under that name, and its identity is the segment's instead of that of files and configuration."""
     solution, described = result.solution, describe_verdict(result)
     origin = solution.lla[0]
     track = _local(origin, solution.lla)
-    with rr.RecordingStream(_APPLICATION, recording_id=identity or recording_id(result), send_properties=False) as recording:
+    identity, under = (recording_id(result), "") if layer is None else (layer[0], f"/{layer[1]}")
+    with LayerStream(_APPLICATION, identity, under) as recording:
         recording.set_log_time_enabled(False)
         recording.set_log_tick_enabled(False)
-        recording.save(path, default_blueprint=_layout(result, track))
-        recording.send_recording_name(f"{_APPLICATION}: {solution.method}")
+        recording.save(path, default_blueprint=_layout(result, track, under))
+        recording.send_recording_name(identity if layer else f"{_APPLICATION}: {solution.method}")
         _send_verdict(recording, described)
+        send_properties(recording, result, layer[1] if layer else "run", described["summary"])
+        send_outages(recording, result)
         _send_track(recording, solution, track)
         _send_reference_and_fixes(recording, result, origin)
         _send_outage_tracks(recording, result, track)
@@ -75,16 +80,15 @@ def _local(origin: Floats, lla: Floats) -> Floats:
     return enu_from_ned(ned_between(origin, lla))
 
 
-def _layout(result: RunResult, track: Floats) -> Any:
+def _layout(result: RunResult, track: Floats, under: str) -> Any:
     low, high = track.min(axis=0), track.max(axis=0)
     middle, (wide, tall, _) = (low + high) / 2, np.maximum(high - low, 10.0)
     eye = middle + np.array([0.0, -0.5, 0.75]) * max(wide, _ASPECT * tall)
     circumference = 2 * np.pi * SEMI_MAJOR_AXIS * np.cos(result.solution.lla[0, 0])
     zoom = np.clip(np.log2(circumference / (0.5 * max(wide, _MAP_ASPECT * tall))), 1, 18)
     duration_s = float(result.solution.t_ns[-1] - result.solution.t_ns[0]) / 1e9
-    return build_layout(
-        list_stacks(result), duration_s, tuple(eye.tolist()), tuple(middle.tolist()), float(zoom), result.sky is not None
-    )
+    stacks, sky = list_stacks(result), result.sky is not None
+    return build_layout(stacks, duration_s, tuple(eye.tolist()), tuple(middle.tolist()), float(zoom), sky, under)
 
 
 def _send_track(recording: rr.RecordingStream, solution: Solution, track: Floats) -> None:
@@ -159,8 +163,7 @@ def _send_ellipsoids(recording: rr.RecordingStream, solution: Solution, track: F
 
 
 def _send_verdict(recording: rr.RecordingStream, described: Mapping[str, Any]) -> None:
-    """As a property, which a catalogue shows as columns, and as a document beside the events."""
-    recording.send_property("verdict", rr.AnyValues(grade=described["grade"], summary=described["summary"]))
+    """As a document beside the events."""
     text = "\n".join([f"**Verdict: {described['summary']}**\n", *(f"- {line}" for line in described["lines"])])
     recording.log("/verdict", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
 

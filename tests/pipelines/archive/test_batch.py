@@ -14,10 +14,8 @@ from pathlib import Path
 import pytest
 
 from pipelines import cli
-from pipelines.archive.drives import find_drives, list_files
 from pipelines.archive.executors import ProcessPool
 from pipelines.archive.manifest import code_version, read_manifest
-from pipelines.config.spec import Config
 from synthetic_logs import SCENARIOS, simulate, with_duration, write
 
 QUIET = ["--quiet", "--set", "output.recording=false"]
@@ -50,27 +48,6 @@ def tree(folder: Path) -> dict[str, str]:
 
 def batch(archive: Path, out: Path, *options: str) -> int:
     return cli.main(["batch", str(archive), "-o", str(out), *QUIET, *options])
-
-
-def test_drives_are_found_with_their_references(archive: Path) -> None:
-    drives, others = find_drives(list_files([str(archive)]), archive, Config().input)
-    found = {drive.name: ([path.name for path in drive.logs], drive.reference and drive.reference.name) for drive in drives}
-    assert found["monday/one"] == (["one.mcap"], "one.truth.csv")
-    assert found["monday/two"] == (["two.bag"], "two.truth.csv")
-    assert found["tuesday/three"] == (["three.fix.csv", "three.imu.csv"], "three.truth.csv")
-    assert set(found) == {"monday/one", "monday/two", "tuesday/three", "tuesday/cut", "tuesday/again"}
-    assert [path.name for path in others] == ["notes.md"]
-
-
-def test_splits_of_a_recording_are_one_drive(tmp_path: Path) -> None:
-    log = simulate(with_duration(SCENARIOS["car-short"], 20.0), 1)
-    for number in (0, 1, 10, 2):
-        write(log, tmp_path / f"drive_{number}.mcap")
-    (drive,) = find_drives([path for path in list_files([str(tmp_path)]) if path.suffix == ".mcap"], tmp_path, Config().input)[
-        0
-    ]
-    assert drive.name == "drive"
-    assert [path.name for path in drive.logs] == [f"drive_{number}.mcap" for number in (0, 1, 2, 10)]
 
 
 def test_the_tree_is_the_same_whatever_the_workers_and_a_second_run_does_nothing(archive: Path, tmp_path: Path) -> None:

@@ -146,17 +146,3 @@ def test_a_survey_tells_of_all_drives(two_batches: tuple[Path, Path], capsys: py
     assert 0 < group["horizontal_rms_m"]["p50"] <= group["horizontal_rms_m"]["p95"] < 5
     assert {one["drive"] for one in values["look_at"]} == {"drive1", "drive2"}
     assert cli.main(["summary", str(two_batches[0].parent)]) == 1
-
-
-def test_the_archive_opens_in_rerun(two_batches: tuple[Path, Path]) -> None:
-    pytest.importorskip("datafusion")
-    from pipelines.archive.serve import NAME, open_server
-
-    server = open_server(two_batches[0])
-    try:
-        dataset = server.client().get_dataset(NAME)
-        segments = dataset.segment_table().to_pandas()
-        assert len(segments) == 2
-        assert "127.0.0.1" in server.url()
-    finally:
-        server.shutdown()

@@ -95,8 +95,8 @@ def test_the_verdict_is_the_first_event_and_a_property(recording: Path, result: 
     document = read_entity(recording, "/verdict", static=True)["TextDocument:text"].to_pylist()[0][0]
     assert document.startswith(f"**Verdict: {result.verdict.grade}")
     assert "- positions: " in document
-    table = read_entity(recording, "/__properties/verdict", static=True)
-    assert table["grade"].to_pylist() == [[result.verdict.grade]]
+    table = read_entity(recording, "/__properties/run", static=True)
+    assert table["verdict"].to_pylist() == [[result.verdict.grade]]
 
 
 def test_run_without_reference_and_fixes_is_recorded(tmp_path: Path) -> None:
