@@ -4,7 +4,7 @@ A run is poor where what it says cannot be believed: the solution is not finite;
 outliers do not explain it (they stand five or more in a row, or the bulk of the kind lies too far off for the noise that was
 taken); a kind's innovations, or the fixes' distances to the solution, have a median square of more than 4 times the expected
 one, or have so in more than a tenth of the windows of 30 s; the filter was started anew three times; or a reference shows the
-solution at more than twice the error of its fixes. It is fair where there is something of that to a lesser degree.
+solution at more than twice the error of its fixes, or at more than five times the error that it expects of itself. It is fair where there is something of that to a lesser degree.
 """
 
 from collections.abc import Mapping
@@ -23,9 +23,10 @@ from navreplay.evaluation.credit import (
     position_noise,
     use_of,
 )
+from navreplay.evaluation.metrics import Evaluation
 from navreplay.evaluation.outages import find_outages, mark_unaided
 from navreplay.solution import Outage, Solution
-from navreplay.timeline import Timeline
+from navreplay.timeline import GnssFixSeries, Timeline
 
 __all__ = ["Fault", "Grade", "Verdict", "judge"]
 
@@ -36,6 +37,7 @@ _POOR_SQUARE, _FAIR_SQUARE = 4.0, 2.5
 _POOR_WINDOWS = 0.1
 _POOR_RESTARTS = 3
 _POOR_BESIDE_FIXES, _FAIR_BESIDE_FIXES = 2.0, 1.2
+_POOR_BESIDE_EXPECTED, _FAIR_BESIDE_EXPECTED = 5.0, 2.5
 _TOLD_WRONG = 2.0
 _LONG_OUTAGE_S = 60.0
 _LEAST = 20
@@ -45,7 +47,7 @@ _LEAST = 20
 @dataclass(frozen=True, slots=True)
 class Fault:
     """What speaks against a run. code: ``finite``, ``rejected``, ``innovations``, ``windows``, ``distance``, ``far-windows``,
-    ``restarts``, ``reference``, ``told``, ``backward`` or ``outage``. kind: of the measurements, where it is theirs. value:
+    ``restarts``, ``reference``, ``expected``, ``told``, ``backward`` or ``outage``. kind: of the measurements, where it is theirs. value:
     the share, ratio, number or seconds that is too large."""
 
     grade: Grade
@@ -57,10 +59,11 @@ class Fault:
 @dataclass(frozen=True, eq=False, slots=True)
 class Verdict:
     """grade: the worst of the faults', good without any. faults: the worst first. kinds: of measurements. closeness: to the
-    fixes. fix_errors: beside the fixes, where there is a reference. backward: see `Solution`. accuracy: expected horizontal,
+    fixes, or to the least-squares positions of ranges. fix_errors: beside those, where there is a reference. backward: see `Solution`. accuracy: expected horizontal,
     median and 95 % [m]: the covariance's times calibration, the larger of 1 and the root of the positions' NIS; where the log's
     accuracy of positions is refuted, that which was taken for a fix at least, since such errors stay.
-    events: counts by kind. outages: number of stretches without positions, and the longest [s]."""
+    events: counts by kind. outages: number of stretches without positions, and the longest [s]. by_points: closeness and
+    fix_errors are of least-squares positions of single epochs, whose own outliers do not speak against the solution."""
 
     grade: Grade
     faults: tuple[Fault, ...]
@@ -72,23 +75,29 @@ class Verdict:
     calibration: float
     events: Mapping[str, int]
     outages: tuple[int, float]
+    by_points: bool = False
 
 
-def judge(solution: Solution, timeline: Timeline) -> Verdict:
+def judge(
+    solution: Solution, timeline: Timeline, points: GnssFixSeries | None = None, evaluation: Evaluation | None = None
+) -> Verdict:
     """The verdict on a solution of the IMU (or, without one, of the antenna); timeline: what it was made of, with the reference
-    where there is one."""
+    where there is one; points: least-squares positions of the ranges it was made of; evaluation: by the reference."""
     kinds = tuple(use_of(series) for series in solution.innovations)
     outages = solution.outages or find_outages(solution)
-    closeness, fix_errors = _beside_fixes(solution, timeline, outages)
+    closeness, fix_errors = _beside_fixes(solution, timeline, points, outages)
     calibration = max([1.0, *(use.nis for use in kinds if use.kind in ("position", "range") and use.nis > 1)]) ** 0.5
     lengths = [(outage.end_ns - outage.start_ns) / 1e9 for outage in outages]
     events = {kind: sum(event.kind == kind for event in solution.events) for kind in ("restart", "lock-out")}
     faults = [fault for use in kinds for fault in _faults_of(use)]
-    faults += _faults_of_distance(closeness, fix_errors)
+    faults += _faults_of_distance(closeness, fix_errors, points is not None)
     faults += _faults_of_run(solution, events["restart"], max(lengths, default=0.0))
     refuted = _refuted_noise(solution)
     faults += [Fault("fair", "told", kind, scale) for kind, scale in refuted.items()]
     floor = position_noise(solution) if "position" in refuted else 0.0
+    accuracy = expected_accuracy(solution, calibration, floor)
+    if evaluation is not None and not (fix_errors is not None and fix_errors.own):
+        faults += _faults_of_claim(evaluation, accuracy[0])
     faults.sort(key=lambda fault: fault.grade, reverse=True)  # poor, then fair
     return Verdict(
         grade=faults[0].grade if faults else "good",
@@ -97,22 +106,23 @@ def judge(solution: Solution, timeline: Timeline) -> Verdict:
         closeness=closeness,
         fix_errors=fix_errors,
         backward=solution.backward,
-        accuracy=expected_accuracy(solution, calibration, floor),
+        accuracy=accuracy,
         calibration=calibration,
         events=events,
         outages=(len(outages), max(lengths, default=0.0)),
+        by_points=points is not None,
     )
 
 
 def _beside_fixes(
-    solution: Solution, timeline: Timeline, outages: tuple[Outage, ...]
+    solution: Solution, timeline: Timeline, points: GnssFixSeries | None, outages: tuple[Outage, ...]
 ) -> tuple[Closeness | None, FixErrors | None]:
-    fixes = timeline.fixes
+    fixes = timeline.fixes if points is None else points
     if fixes is None or len(solution) < 2 or not np.isfinite(solution.lla).all():
         return None, None
     unaided = mark_unaided(fixes.t_ns, solution, outages)
     arm = timeline.fix_lever_b if timeline.imu is not None else np.zeros(3)
-    if not any(series.kind == "position" and not series.sources for series in solution.innovations):
+    if points is None and not any(series.kind == "position" and not series.sources for series in solution.innovations):
         return None, None  # fixes that the filter was not given are no measure of it
     closeness = compare_with_fixes(solution, fixes, arm, unaided)
     if timeline.reference is None:
@@ -144,16 +154,24 @@ def _faults_of(use: KindUse) -> list[Fault]:
     ]
 
 
-def _faults_of_distance(closeness: Closeness | None, fix_errors: FixErrors | None) -> list[Fault]:
+def _faults_of_distance(closeness: Closeness | None, fix_errors: FixErrors | None, by_points: bool) -> list[Fault]:
     faults = []
     if closeness is not None and closeness.count >= _LEAST:
         off = closeness.windows_off / closeness.windows if closeness.windows else 0.0
         faults += _graded("distance", "", closeness.square, _POOR_SQUARE, _FAIR_SQUARE)
-        faults += [] if faults else _graded("far-windows", "", off, _POOR_WINDOWS, 0.0)
+        faults += [] if faults or by_points else _graded("far-windows", "", off, _POOR_WINDOWS, 0.0)
     if fix_errors is not None and fix_errors.count >= _LEAST and not fix_errors.own:
         ratio = fix_errors.solution / fix_errors.fixes
         faults += _graded("reference", "", ratio, _POOR_BESIDE_FIXES, _FAIR_BESIDE_FIXES)
     return faults
+
+
+def _faults_of_claim(evaluation: Evaluation, expected: float) -> list[Fault]:
+    """Of what the solution says of itself, where a reference knows better."""
+    outside = evaluation.statistics["outside"]["position"]["horizontal"]
+    if outside.count < _LEAST or not expected > 0:
+        return []
+    return _graded("expected", "", outside.p50 / expected, _POOR_BESIDE_EXPECTED, _FAIR_BESIDE_EXPECTED)
 
 
 def _faults_of_run(solution: Solution, restarts: int, longest_s: float) -> list[Fault]:

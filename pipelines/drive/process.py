@@ -17,6 +17,7 @@ from navreplay.evaluation.sky import view_sky
 from navreplay.evaluation.verdict import judge
 from navreplay.filters.presets import build_method
 from navreplay.filters.run import run_filter
+from navreplay.measurements.least_squares import fixes_of, solve_points
 from navreplay.solution import Solution
 from navreplay.timeline import Floats, GnssFixSeries, LogError, RangeSeries, Timeline
 from pipelines.config.spec import Config
@@ -87,7 +88,7 @@ def filter_drive(drive: Drive, config: Config, progress: Progress | None = None,
         solution = replace(solution, outages=find_outages(solution, _simulated_windows(timeline, config)))
         evaluation = None if timeline.reference is None else evaluate(solution, timeline.reference, _reference_lever(timeline))
         sky = None if used.ranges is None else view_sky(used.ranges, solution)
-        verdict = judge(solution, used)
+        verdict = judge(solution, used, _points(used, config, drive.forward), evaluation)
     advice = None
     if advised and verdict.grade != "good":
         with _stage("advising", timing, progress):
@@ -99,6 +100,14 @@ def filter_drive(drive: Drive, config: Config, progress: Progress | None = None,
 def _aiding(timeline: Timeline, config: Config) -> GnssFixSeries | RangeSeries | None:
     """What aids the filter."""
     return timeline.fixes if timeline.ranges is None or config.filter.use == "fixes" else timeline.ranges
+
+
+def _points(timeline: Timeline, config: Config, forward: float) -> GnssFixSeries | None:
+    """Least-squares positions of the ranges that aided the filter; None where others did."""
+    aiding = _aiding(timeline, config)
+    if not isinstance(aiding, RangeSeries):
+        return None
+    return fixes_of(solve_points(aiding, options_of(config, forward).ranges)[0])
 
 
 def _withhold(timeline: Timeline, config: Config) -> Timeline:

@@ -118,10 +118,11 @@ def _fault_text(fault: Fault) -> str:
         "rejected": f"{100 * fault.value:.2g} % of {kind} were rejected, and outliers do not explain it",
         "innovations": f"innovations of {kind} are {times} as large as they should be",
         "windows": f"innovations of {kind} are more than twice as large as they should be in {_share(fault.value)}",
-        "distance": f"the fixes lie {times} as far from the solution as both covariances say",
+        "distance": f"the positions it was given lie {times} as far from the solution as both covariances say",
         "far-windows": f"the fixes lie more than twice as far off as both covariances say in {_share(fault.value)}",
         "restarts": f"the filter lost its way and was started anew {_count(round(fault.value), 'time')}",
-        "reference": f"against the reference the solution is {fault.value:.2g} times as far off as its fixes",
+        "reference": f"against the reference the solution is {fault.value:.2g} times as far off as the positions it was given",
+        "expected": f"against the reference the solution is {fault.value:.2g} times as far off as it expects of itself",
         "told": f"the log tells the accuracy of {kind} too well: {fault.value:.2g} times as much was taken",
         "backward": f"forward and smoothed positions differ {times} as much as they should",
         "outage": f"positions are missing for {fault.value:.0f} s in a row",
@@ -168,17 +169,18 @@ def _kind_line(use: KindUse) -> str:
 def _fix_lines(verdict: Verdict) -> list[str]:
     lines = []
     near, errors = verdict.closeness, verdict.fix_errors
+    they = "least-squares positions of single epochs" if verdict.by_points else "fixes"
     if near is not None:
         lines.append(
-            f"distance of fixes to the solution: {_metres(near.median)} median, {_metres(near.p95)} 95 %; squared "
+            f"distance of {they} to the solution: {_metres(near.median)} median, {_metres(near.p95)} 95 %; squared "
             f"{figure_text(near.square if isfinite(near.square) else None)} of what both covariances say"
         )
     if errors is not None and errors.own:
         lines.append("the reference is made of these fixes, and does not judge them")
     elif errors is not None:
         lines.append(
-            f"against the reference, outside outages: fixes {_metres(errors.fixes)} RMS, solution {_metres(errors.solution)} "
-            f"({errors.count} fixes)"
+            f"against the reference, outside outages: {they} {_metres(errors.fixes)} RMS, solution {_metres(errors.solution)} "
+            f"({errors.count} of them)"
         )
     return lines
 
@@ -211,6 +213,7 @@ def _cause(fault: Fault) -> str:
     return {
         "finite": "arithmetic that left the finite numbers: noise or values in the log that are out of all proportion",
         "reference": "a fault that the fixes do not show: a lever arm, the time, or the reference's own frame",
+        "expected": "errors that stay and that all measurements share, which no innovation shows: atmosphere, a base, a datum",
         "told": f"the accuracy of {_plural(fault.kind)}, which the log tells too well",
         "backward": "the told noise of IMU or measurements, by which the forward pass was surer of itself than it should be",
         "outage": f"a stretch of {fault.value:.0f} s without positions",

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from navreplay.evaluation.credit import use_of
+from navreplay.evaluation.metrics import evaluate
 from navreplay.evaluation.verdict import Verdict, judge
 from navreplay.geodesy.earth import move_lla
 from navreplay.solution import Event, InnovationSeries, Solution
@@ -167,3 +168,29 @@ def test_refuted_noise_is_told_and_bounds_the_accuracy(solution: Solution, timel
     noise = np.median(np.linalg.norm(solution.innovations[0].noise_std[:, :2], axis=1))
     assert codes(verdict, "fair") == {"told"}
     assert verdict.accuracy[0] >= noise
+
+
+@pytest.mark.parametrize(("off", "grade"), [(1.0, "good"), (3.5, "fair"), (8.0, "poor")])
+def test_a_reference_contradicts_what_a_run_expects_of_itself(
+    solution: Solution, timeline: Timeline, off: float, grade: str
+) -> None:
+    """Fixes and solution share an error that no innovation shows."""
+    expected = judge(solution, timeline).accuracy[0]
+    reference = timeline.reference
+    assert reference is not None
+    away = replace(reference, lla=move_lla(reference.lla, np.tile([off * expected, 0.0, 0.0], (len(reference), 1))))
+    seen = replace(timeline, reference=away)
+    verdict = judge(solution, seen, evaluation=evaluate(solution, away))
+    assert {fault.grade for fault in verdict.faults if fault.code == "expected"} == ({grade} - {"good"})
+
+
+def test_outliers_of_single_epochs_do_not_speak_against_a_solution_by_ranges(solution: Solution, timeline: Timeline) -> None:
+    fixes = timeline.fixes
+    assert fixes is not None
+    wild = np.arange(len(fixes)) % 40 < 22
+    points = replace(fixes, lla=move_lla(fixes.lla, np.where(wild[:, None], 200.0, 0.0) * [1.0, 0.0, 0.0]))
+    with_fixes = judge(with_innovations(solution, series()), replace(timeline, fixes=points))
+    by_points = judge(with_innovations(solution, series()), timeline, points)
+    assert {fault.code for fault in with_fixes.faults} & {"far-windows", "distance"}
+    assert "far-windows" not in {fault.code for fault in by_points.faults}
+    assert by_points.by_points
