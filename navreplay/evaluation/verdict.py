@@ -4,7 +4,8 @@ A run is poor where what it says cannot be believed: the solution is not finite;
 outliers do not explain it (they stand five or more in a row, or the bulk of the kind lies too far off for the noise that was
 taken); a kind's innovations, or the fixes' distances to the solution, have a median square of more than 4 times the expected
 one, or have so in more than a tenth of the windows of 30 s; the filter was started anew three times; or a reference shows the
-solution at more than twice the error of its fixes, or at more than five times the error that it expects of itself. It is fair where there is something of that to a lesser degree.
+solution at more than twice the error of its fixes, or at more than five times the error that it expects of itself. It is fair
+where there is something of that to a lesser degree.
 """
 
 from collections.abc import Mapping
@@ -47,8 +48,8 @@ _LEAST = 20
 @dataclass(frozen=True, slots=True)
 class Fault:
     """What speaks against a run. code: ``finite``, ``rejected``, ``innovations``, ``windows``, ``distance``, ``far-windows``,
-    ``restarts``, ``reference``, ``expected``, ``told``, ``backward`` or ``outage``. kind: of the measurements, where it is theirs. value:
-    the share, ratio, number or seconds that is too large."""
+    ``restarts``, ``reference``, ``expected``, ``told``, ``backward`` or ``outage``. kind: of the measurements,
+    where it is theirs. value: the share, ratio, number or seconds that is too large."""
 
     grade: Grade
     code: str
@@ -59,7 +60,8 @@ class Fault:
 @dataclass(frozen=True, eq=False, slots=True)
 class Verdict:
     """grade: the worst of the faults', good without any. faults: the worst first. kinds: of measurements. closeness: to the
-    fixes, or to the least-squares positions of ranges. fix_errors: beside those, where there is a reference. backward: see `Solution`. accuracy: expected horizontal,
+    fixes, or to the least-squares positions of ranges. fix_errors: beside those, where there is a reference. backward: see
+    `Solution`. accuracy: expected horizontal,
     median and 95 % [m]: the covariance's times calibration, the larger of 1 and the root of the positions' NIS; where the log's
     accuracy of positions is refuted, that which was taken for a fix at least, since such errors stay.
     events: counts by kind. outages: number of stretches without positions, and the longest [s]. by_points: closeness and
