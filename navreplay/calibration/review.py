@@ -5,7 +5,8 @@ the whole log, by medians, which faults of single epochs do not move:
     d_k = z_k - leftover_k-1, the change between epochs that the inertial sensors did not see: 2 R and what they drift by in
           between, whatever the filter believes of R (the differences of Ge et al., Sensors 20 (2020) 6041, section 3);
     nu_k, the innovation: spread + R.
-Of ranges, what all of an epoch share (the receiver clock) is taken from both by a median over its satellites.
+Of ranges, what all of an epoch share (the receiver clock) is taken from both by a median over its satellites, and noise is only
+scaled up: among reflections the quiet majority says nothing of the few, which a filter that believes it would follow.
 Told too small, R is scaled to what d shows, and if measurements are still shut out, to what nu shows: then the errors stay for
 longer than an epoch, and a filter that trusts them less is the honest one. Told too large, R is scaled down, but to no less
 than twice the deviations that d shows and a tenth of those told: a receiver that smooths has errors that stay and d does
@@ -56,7 +57,7 @@ class Review:
             if series.kind not in _SCALES | _RANGE_SCALES or series.step is None or _count_epochs(series) < _LEAST_EPOCHS:
                 continue
             factor, reason = self._factor(series)
-            if factor > 1.0 or (factor < 1.0 and not amended):
+            if factor > 1.0 or (factor < 1.0 and not amended and not series.sources):
                 factors[series.kind] = factor
                 reasons.append(reason)
         if not factors:
