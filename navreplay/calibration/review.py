@@ -1,6 +1,6 @@
 """The default method: the filter with the noise it is told, unless its own innovations refute that (`checked`).
 
-The first pass is `fixed`, and is the result where the log bears its noise out. Each kind of measurement is then looked at over
+The first pass is `iekf`, and is the result where the log bears its noise out. Each kind of measurement is then looked at over
 the whole log, by medians, which faults of single epochs do not move:
     d_k = z_k - leftover_k-1, the change between epochs that the inertial sensors did not see: 2 R and what they drift by in
           between, whatever the filter believes of R (the differences of Ge et al., Sensors 20 (2020) 6041, section 3);
@@ -13,7 +13,7 @@ than twice the deviations that d shows and a tenth of those told: a receiver tha
 not see, and nobody tells a variance a hundred times too large by chance.
 Assumes: noise whose told size is wrong by one factor per kind, through most of the log.
 Fails: noise that changes in level (see `auto`); a wrong process noise, which is not looked for.
-When well specified: bit-identical to `fixed`.
+When well specified: bit-identical to `iekf`.
 """
 
 from dataclasses import dataclass, replace

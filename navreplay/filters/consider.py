@@ -21,7 +21,7 @@ from navreplay.error_models.considered import ConsideredModel
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.error_models.ned import Propagated
 from navreplay.filters.bank import Bank
-from navreplay.filters.moments import Linearised, MomentRule
+from navreplay.filters.moments import Linearised
 from navreplay.filters.presets import Method
 from navreplay.filters.update import Estimator, Updater
 from navreplay.mechanisation.strapdown import Leg, NavState
@@ -41,7 +41,7 @@ class Schmidt(Linearised):
     """A rule that is of first order at the measurement, with a gain of zero for the states behind the first `estimated`, whose
     variances stay told (p,)."""
 
-    rule: MomentRule
+    rule: Linearised
     estimated: int
     told: Floats
 
@@ -56,10 +56,10 @@ class Schmidt(Linearised):
         gain[self.estimated :] = 0
         posterior = condition(prior, innovation, noise, gain)
         variance = np.diagonal(posterior.cov)[self.estimated :]
-        if (variance == self.told).all():
-            return posterior
-        back = np.append(np.ones(self.estimated), np.sqrt(self.told / variance))
-        return posterior._replace(cov=posterior.cov * back * back[:, None])
+        if not (variance == self.told).all():
+            back = np.append(np.ones(self.estimated), np.sqrt(self.told / variance))
+            posterior = posterior._replace(cov=posterior.cov * back * back[:, None])
+        return self.rule.settle(posterior)
 
 
 class ConsideredAiding:
@@ -170,6 +170,7 @@ def set_up(aiding: Aiding, model: ErrorModel, method: Method, options: FilterOpt
     as `check_considers` allows."""
     if not (method.considers or options.consider.every_method):
         return Setup(aiding, model, method)
+    assert isinstance(method.rule, Linearised)  # as `check_considers` holds
     considered = ConsideredModel.of(model, options.consider)
     rule = Schmidt(method.rule, model.size, np.diagonal(considered.bias_cov))
     return Setup(ConsideredAiding(aiding, considered), considered, replace(method, rule=rule))

@@ -46,4 +46,8 @@ class Linearised:
 
     def condition(self, prior: Gaussian, innovation: Innovation, noise: Floats) -> Gaussian:
         """Posterior with R = noise (m, m), by the optimal gain."""
-        return condition(prior, innovation, noise)
+        return self.settle(condition(prior, innovation, noise))
+
+    def settle(self, posterior: Gaussian) -> Gaussian:
+        """The posterior of mean (n,) about the state that it moves to: the same, where errors add up."""
+        return posterior

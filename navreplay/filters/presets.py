@@ -28,6 +28,7 @@ from navreplay.calibration.em_offline import EmOffline
 from navreplay.calibration.review import Review
 from navreplay.calibration.settled import Calibration
 from navreplay.filters.cubature import Cubature
+from navreplay.filters.invariant import Invariant
 from navreplay.filters.moments import Linearised, MomentRule
 from navreplay.filters.weights import Immae, Mmae, MmaeFloor
 from navreplay.plugins import load_plugins
@@ -121,9 +122,15 @@ def _share_of(part: Callable[..., Any], parameters: Mapping[str, Any]) -> dict[s
 PRESETS: dict[str, Preset | BankPreset] = {
     preset.name: preset
     for preset in (
-        Preset("checked", "fixed, with the noise that the whole log bears out (the default)", Fixed, review=Review),
+        Preset("checked", "iekf, with the noise that the whole log bears out (the default)", Fixed, Invariant, review=Review),
         Preset("fixed", "extended Kalman filter with the noise it is told", Fixed),
         Preset("ekf", "extended Kalman filter in the direct formulation: the same as fixed (Lou et al. 2019)", Fixed),
+        Preset(
+            "iekf",
+            "the same with the error on SE2(3), for large errors of attitude (Barrau and Bonnabel 2017)",
+            Fixed,
+            Invariant,
+        ),
         Preset("eckf", "biases reckoned with but not estimated (Schmidt 1966, Lou et al. 2019)", Fixed, considers=True),
         Preset("psteckf", "eckf with a fading factor on P (Lou et al. 2019)", Fixed, considers=True, tracking=PartialTracking),
         Preset("iae", "R from the innovations of a window (Mohamed and Schwarz 1999)", Iae),
