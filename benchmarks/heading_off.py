@@ -1,4 +1,4 @@
-"""Methods started in motion with a heading that is far off: python benchmarks/heading_off.py [--seeds 10] [--methods fixed ckf iekf]
+"""Methods started in motion with a heading that is far off: python benchmarks/heading_off.py [--seeds 10]
 
 The log begins 45 s into a drive or flight; the filter is told a heading off by 0, 60 or 120 degrees to either side, with a
 standard deviation of 60 degrees (of 1 degree at 0), and starts there without trying others. A cell: starts of which the heading
@@ -60,7 +60,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--methods", nargs="+", default=["fixed", "ckf", "iekf"])
     arguments = parser.parse_args()
-    print("| | " + " | ".join(arguments.methods) + " |\n|---" * 1 + "|---" * len(arguments.methods) + "|")
+    print("| | " + " | ".join(arguments.methods) + " |\n" + "|---" * (1 + len(arguments.methods)) + "|")
     for scenario, velocities in DRIVES:
         logs = [
             in_motion(simulate(with_duration(SCENARIOS[scenario], 160.0), seed), velocities)
