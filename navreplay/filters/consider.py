@@ -21,10 +21,10 @@ from navreplay.error_models.considered import ConsideredModel
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.error_models.ned import Propagated
 from navreplay.filters.bank import Bank
-from navreplay.filters.moments import Linearised
 from navreplay.filters.presets import Method
 from navreplay.filters.update import Estimator, Updater
 from navreplay.mechanisation.strapdown import Leg, NavState
+from navreplay.moments.linearised import Linearised
 from navreplay.options import FilterOptions
 from navreplay.timeline import Floats, LogError, Times
 from navreplay.update.adapter import is_measured

@@ -27,10 +27,10 @@ from navreplay.calibration.auto import Auto
 from navreplay.calibration.em_offline import EmOffline
 from navreplay.calibration.review import Review
 from navreplay.calibration.settled import Calibration
-from navreplay.filters.cubature import Cubature
-from navreplay.filters.invariant import Invariant
-from navreplay.filters.moments import Linearised, MomentRule
 from navreplay.filters.weights import Immae, Mmae, MmaeFloor
+from navreplay.moments.cubature import Cubature
+from navreplay.moments.invariant import Invariant
+from navreplay.moments.linearised import Linearised, MomentRule
 from navreplay.plugins import load_plugins
 from navreplay.timeline import LogError
 from navreplay.update.adapter import NoiseAdapter

@@ -6,8 +6,8 @@ import numpy as np
 
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.error_models.ned import NedErrorModel, Propagated
-from navreplay.filters.moments import Linearised
 from navreplay.mechanisation.strapdown import Leg, NavState
+from navreplay.moments.linearised import Linearised
 from navreplay.timeline import Floats
 from synthetic_logs.sensors.windows import ScaledWindow, scale_in
 

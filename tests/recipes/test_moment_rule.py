@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from navreplay.adapt.fixed import Fixed
-from navreplay.filters.moments import Linearised
 from navreplay.filters.presets import Preset
 from navreplay.filters.run import run_filter
+from navreplay.moments.linearised import Linearised
 from navreplay.options import FilterOptions
 from navreplay.timeline import Floats
 from navreplay.update.gaussian import Gaussian, Innovation, condition, kalman_gain

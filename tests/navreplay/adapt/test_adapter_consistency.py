@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from navreplay.adapt.likelihood.maximum_likelihood import MaximumLikelihood
-from navreplay.filters.moments import Linearised
 from navreplay.filters.presets import Method, build_method
+from navreplay.moments.linearised import Linearised
 from navreplay.update.gaussian import Gaussian, chi_square, condition, symmetric
 from navreplay.update.measurement import Measurement
 

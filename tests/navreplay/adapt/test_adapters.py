@@ -20,8 +20,8 @@ from navreplay.adapt.robust.student_t import StudentT
 from navreplay.adapt.windowed.iae import Iae
 from navreplay.adapt.windowed.iae_q import IaeQ
 from navreplay.adapt.windowed.sage_husa import SageHusa
-from navreplay.filters.moments import Linearised
 from navreplay.filters.presets import PRESETS, build_method
+from navreplay.moments.linearised import Linearised
 from navreplay.update.gaussian import Gaussian, Innovation, condition
 from navreplay.update.measurement import Measurement
 

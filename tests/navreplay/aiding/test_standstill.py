@@ -8,13 +8,13 @@ import pytest
 from navreplay.aiding.standstill import StandstillAiding, standstill_candidates
 from navreplay.error_models.ned import NedErrorModel
 from navreplay.evaluation.metrics import evaluate
-from navreplay.filters.moments import Linearised
 from navreplay.filters.presets import PRESETS, build_method
 from navreplay.filters.run import run_filter
 from navreplay.geodesy import earth
 from navreplay.geodesy.rotation import quat_from_rotvec, quat_multiply
 from navreplay.measurements.standstill import find_standstills
 from navreplay.mechanisation.strapdown import NavState
+from navreplay.moments.linearised import Linearised
 from navreplay.options import GRADES, FilterOptions, GateOptions, VehicleOptions
 from navreplay.timeline import AttitudeSeries, GnssFixSeries, ImuSeries, Timeline
 from navreplay.update.gaussian import Gaussian

@@ -12,10 +12,10 @@ from navreplay.error_models.ned import Propagated
 from navreplay.evaluation.metrics import evaluate
 from navreplay.filters import _bank_kernel
 from navreplay.filters.bank import Stack, mix, move_stack, update_stack
-from navreplay.filters.moments import Linearised
 from navreplay.filters.presets import build_method
 from navreplay.filters.run import run_filter
 from navreplay.filters.weights import Immae, Mmae, MmaeFloor
+from navreplay.moments.linearised import Linearised
 from navreplay.options import FilterOptions
 from navreplay.solution import Solution
 from navreplay.timeline import LogError, Timeline

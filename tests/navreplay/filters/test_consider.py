@@ -11,10 +11,10 @@ from navreplay.error_models.considered import ConsideredModel
 from navreplay.error_models.ned import NedErrorModel
 from navreplay.evaluation.metrics import evaluate
 from navreplay.filters.consider import Schmidt
-from navreplay.filters.moments import Linearised
 from navreplay.filters.presets import PRESETS, Preset, build_method
 from navreplay.filters.run import run_filter
 from navreplay.mechanisation.strapdown import Leg, NavState, make_steps
+from navreplay.moments.linearised import Linearised
 from navreplay.options import ConsiderOptions, FilterOptions, GateOptions
 from navreplay.solution import Solution
 from navreplay.timeline import LogError, Timeline

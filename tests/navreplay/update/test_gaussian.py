@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from navreplay.filters.moments import Linearised
 from navreplay.filters.presets import PRESETS, build_method
+from navreplay.moments.linearised import Linearised
 from navreplay.timeline import LogError
 from navreplay.update.gaussian import Gaussian, Innovation, chi_square, condition, kalman_gain
 from navreplay.update.measurement import Measurement

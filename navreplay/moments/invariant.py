@@ -20,8 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from navreplay.error_models.ned import ATTITUDE, POSITION, VELOCITY
-from navreplay.filters.moments import Linearised
 from navreplay.geodesy.rotation import matrix_from_quat, quat_from_rotvec, skew
+from navreplay.moments.linearised import Linearised
 from navreplay.timeline import Floats
 from navreplay.update.gaussian import Gaussian, symmetric
 

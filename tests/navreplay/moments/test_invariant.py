@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from navreplay.filters.invariant import Invariant, left_jacobian
 from navreplay.filters.presets import build_method
 from navreplay.filters.run import run_filter
 from navreplay.geodesy.rotation import euler_from_quat, matrix_from_quat, quat_from_rotvec, skew, wrap_angle
+from navreplay.moments.invariant import Invariant, left_jacobian
 from navreplay.options import AlignmentOptions, FilterOptions
 from navreplay.solution import Solution
 from navreplay.timeline import Floats, GnssFixSeries, ImuSeries

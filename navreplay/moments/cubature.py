@@ -19,8 +19,8 @@ from navreplay.error_models.error_model import ErrorModel, MotionModel
 from navreplay.error_models.launch_inertial import LaunchInertialModel
 from navreplay.error_models.ned import NedErrorModel, Propagated
 from navreplay.error_models.pointwise import PointwiseModel
-from navreplay.filters.moments import Linearised
 from navreplay.mechanisation.strapdown import Leg, NavState
+from navreplay.moments.linearised import Linearised
 from navreplay.timeline import Floats, LogError
 
 __all__ = ["Cubature"]

@@ -9,14 +9,14 @@ from navreplay.error_models.ned import NedErrorModel
 from navreplay.error_models.pointwise import PointwiseModel
 from navreplay.error_models.receiver_clock import ReceiverClock
 from navreplay.evaluation.metrics import evaluate
-from navreplay.filters.cubature import Cubature
-from navreplay.filters.moments import Linearised
 from navreplay.filters.presets import build_method
 from navreplay.filters.run import run_filter
 from navreplay.geodesy import earth, rotation
 from navreplay.measurements.fixes import position_measurement
 from navreplay.mechanisation import _cubature_kernel
 from navreplay.mechanisation.strapdown import Leg, NavState, Steps, integrate_steps
+from navreplay.moments.cubature import Cubature
+from navreplay.moments.linearised import Linearised
 from navreplay.options import GRADES, FilterOptions, GateOptions, ImuNoise, RangeOptions
 from navreplay.timeline import LogError, Timeline
 from navreplay.update.gaussian import Gaussian
