@@ -46,6 +46,7 @@ from navreplay.timeline import LogError
 __all__ = ["FORMATS", "Format", "known_formats", "open_log"]
 
 _HEAD_BYTES = 20_000
+_MOST_PACKINGS = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,26 +90,32 @@ def _guarded(added: Format) -> Callable[[str, bytes, InputSettings], Log | None]
 def open_log(path: str | Path, settings: InputSettings | None = None) -> Log:
     """Opens a log (a file, or the folder of a ROS 2 bag) by its content. Raises LogError when it is missing, empty or
     unknown."""
-    settings = settings or InputSettings()
-    name = str(path)
+    return _open(str(path), settings or InputSettings(), 0)
+
+
+def _open(name: str, settings: InputSettings, packings: int) -> Log:
+    """packings: out of how many it came already."""
     if name == "-":
         raise LogError("-: a log is read more than once, so it cannot come from standard input; save it to a file first")
     address = address_of(name)
     if address is not None:
         owner = Scratch()
         place = fetch(address, owner)
-        return _stand_in(address, place, owner, str(place), "", settings)
+        return _stand_in(address, place, owner, str(place), "", settings, packings)
     head = b"" if Path(name).is_dir() else _read_head(name)
     packing = packing_of(head)
     if packing:
+        if packings == _MOST_PACKINGS:
+            raise LogError(f"{name}: is packed more than {_MOST_PACKINGS} times over, which no log is; unpack it")
         owner = Scratch()
         plain, note = unpack_file(name, packing, owner)
-        return _stand_in(name, plain, owner, name, note, _with_plain_names(settings, Path(name).name, plain.name))
+        named = _with_plain_names(settings, Path(name).name, plain.name)
+        return _stand_in(name, plain, owner, name, note, named, packings + 1)
     return _open_plain(name, head, settings)
 
 
-def _stand_in(path: str, place: Path, owner: Scratch, local: str, note: str, settings: InputSettings) -> Log:
-    log = told_as(path, str(place), lambda: open_log(place, settings))
+def _stand_in(path: str, place: Path, owner: Scratch, local: str, note: str, settings: InputSettings, packings: int) -> Log:
+    log = told_as(path, str(place), lambda: _open(str(place), settings, packings))
     return StandIn(log, path, str(place), owner, local, note)
 
 

@@ -8,6 +8,7 @@ import zstandard
 __all__ = ["DamagedDataError", "decompress", "decompress_prefix"]
 
 MAX_CHUNK_BYTES = 1 << 30
+_BLOCK = 1 << 20
 
 
 class DamagedDataError(Exception):
@@ -56,7 +57,7 @@ def decompress_prefix(name: str, data: bytes) -> bytes:
             case "" | "none":
                 return data
             case "zstd":
-                return zstandard.ZstdDecompressor().decompressobj().decompress(data)
+                return _zstd_prefix(data, MAX_CHUNK_BYTES)
             case "lz4":
                 return lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=MAX_CHUNK_BYTES)
             case "bz2":
@@ -64,3 +65,21 @@ def decompress_prefix(name: str, data: bytes) -> bytes:
     except _ERRORS:
         return b""
     return b""
+
+
+def _zstd_prefix(data: bytes, most: int) -> bytes:
+    """What comes out, up to damage and up to most bytes."""
+    blocks, size = [], 0
+    with zstandard.ZstdDecompressor().stream_reader(data) as reader:
+        while size < most:
+            try:
+                block = reader.read(min(_BLOCK, most - size))
+            except zstandard.ZstdError:
+                if not blocks:
+                    raise
+                break
+            if not block:
+                break
+            blocks.append(block)
+            size += len(block)
+    return b"".join(blocks)

@@ -65,8 +65,8 @@ def unpack_file(path: str, packing: str, owner: object) -> tuple[Path, str]:
     return plain, note
 
 
-def _copy(path: str, source: IO[bytes], plain: Path, packed_size: int) -> str:
-    """Copies what comes out, up to damage or to an absurd size; a sentence on damage."""
+def _copy(path: str, source: IO[bytes], plain: Path, packed_size: int, before: int = 0) -> str:
+    """Copies what comes out, up to damage or to an absurd size; a sentence on damage. before: bytes that came out already."""
     limit = max(_NEVER_ABSURD, _LARGEST_RATIO * packed_size)
     written = 0
     with plain.open("wb") as target:
@@ -80,7 +80,7 @@ def _copy(path: str, source: IO[bytes], plain: Path, packed_size: int) -> str:
             if not block:
                 return ""
             written += target.write(block)
-            if written > limit:
+            if before + written > limit:
                 raise LogError(
                     f"{path}: unpacks to more than {limit >> 20} MiB from {packed_size} bytes, which no log does; if it is "
                     "one, unpack it and name what comes out"
@@ -114,10 +114,11 @@ def _unpack_zip(path: str, owner: object) -> tuple[Path, str]:
         if any(member.flag_bits & 1 for member in members):
             raise LogError(f"{path}: is locked by a password; unpack it and name what comes out")
         first = scratch_file(owner, names[0])
-        notes = []
+        notes, size, written = [], Path(path).stat().st_size, 0
         for member, name in zip(members, names, strict=True):
             with archive.open(member) as source:
-                notes.append(_copy(path, source, first.with_name(name), member.compress_size))
+                notes.append(_copy(path, source, first.with_name(name), size, written))
+            written += first.with_name(name).stat().st_size
         shutil.copystat(path, first)
         return (first.parent if len(members) > 1 else first), next((note for note in notes if note), "")
 

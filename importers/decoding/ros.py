@@ -13,6 +13,7 @@ from importers.decoding.ros_definitions import RosType
 __all__ = ["RosDecoder"]
 
 _MAX_LAYOUTS = 16
+_LARGEST_MESSAGE = 1 << 28
 _ZSTD_MAGIC = bytes.fromhex("28b52ffd")
 
 
@@ -131,7 +132,10 @@ def _expand(buffer: Buffer, start: Offsets, stop: Offsets) -> tuple[Buffer, Offs
 
 
 def _decompress(frame: bytes) -> bytes:
+    """The message; empty where it is damaged, or larger than any is."""
     try:
-        return zstandard.ZstdDecompressor().decompressobj().decompress(frame)
+        with zstandard.ZstdDecompressor().stream_reader(frame) as reader:
+            message = reader.read(_LARGEST_MESSAGE + 1)
+        return message if len(message) <= _LARGEST_MESSAGE else b""
     except zstandard.ZstdError:
         return b""

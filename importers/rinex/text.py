@@ -4,6 +4,7 @@ Source: RINEX 3.05 and 4.01 (IGS/RTCM). Compact RINEX (Y. Hatanaka, Bulletin of 
 ``hatanaka``.
 """
 
+import re
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,6 +16,13 @@ from importers.rinex.version_2 import modern_navigation, modern_observation
 from importers.rows.ranges import satellite_names
 from importers.text.table import read_bytes
 from navreplay.timeline import Floats, LogError, Times
+
+_TYPE_COUNTS = re.compile(
+    rb"^(?:[A-Z] {0,4}| {2,5})(\d{1,4})[^\n]{20,60}(?:SYS / # / OBS TYPES|# / TYPES OF OBSERV)", re.MULTILINE
+)
+_HEADER_BYTES = 100_000
+_OBSERVATION_WIDTH = 16
+_NEVER_ABSURD, _LARGEST_RATIO = 1 << 30, 200
 
 __all__ = [
     "Lines",
@@ -138,6 +146,7 @@ def _unpack(path: str, data: bytes) -> tuple[bytes, int]:
             f"{path}: Compact RINEX (Hatanaka) needs the package hatanaka: pip install 'navreplay[formats]', or unpack the "
             "file with crx2rnx"
         ) from error
+    _check_compact_size(path, data)
     try:
         with warnings.catch_warnings(record=True) as told:
             warnings.simplefilter("always")
@@ -146,6 +155,17 @@ def _unpack(path: str, data: bytes) -> tuple[bytes, int]:
         words = " ".join(str(error).split())[:200]
         raise LogError(f"{path}: Compact RINEX that cannot be unpacked: {words}; copy the file again") from error
     return unpacked, len(told)
+
+
+def _check_compact_size(path: str, data: bytes) -> None:
+    """Raises LogError where lines that were satellites with all types of the header would be more than any log."""
+    types = [int(count) for count in _TYPE_COUNTS.findall(data[:_HEADER_BYTES])]
+    largest = data.count(b"\n") * _OBSERVATION_WIDTH * max(types, default=1)
+    if largest > max(_NEVER_ABSURD, _LARGEST_RATIO * len(data)):
+        raise LogError(
+            f"{path}: Compact RINEX of {len(data)} bytes that may unpack to {largest >> 20} MiB, which no log does; if it is "
+            "one, unpack it with crx2rnx"
+        )
 
 
 def _split(body: bytes) -> Lines:

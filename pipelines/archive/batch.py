@@ -4,28 +4,20 @@ import json
 import os
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from navreplay.timeline import LogError
-from pipelines.archive.catalogue import write_catalogue
+from pipelines.archive.destination import Destination
 from pipelines.archive.executors import Executor
-from pipelines.archive.index_page import write_index
-from pipelines.archive.job import Job, clear_parts, run_job
-from pipelines.archive.manifest import (
-    Entry,
-    append_entry,
-    code_version,
-    config_hash,
-    file_stamps,
-    input_hash,
-    read_manifest,
-    write_manifest,
-)
-from pipelines.archive.rules import Assigned
+from pipelines.archive.job import Job, Outcome, run_job
+from pipelines.archive.manifest import Entry, OpenManifest, code_version, config_hash, input_hash
+from pipelines.archive.sources.rules import Assigned
+from pipelines.archive.sources.seen import SeenFiles
 from pipelines.config.spec import Config
+from pipelines.files.remote import is_address
 
 __all__ = ["Plan", "Planned", "Summary", "plan_batch", "run_batch"]
 
@@ -47,16 +39,22 @@ class Planned:
     @property
     def memory(self) -> float:
         """What a worker may need [bytes]."""
-        return _BASE_BYTES + _BYTES_PER_BYTE * sum(size for _, size, _, _ in self.entries[0].files)
+        return _BASE_BYTES + _BYTES_PER_BYTE * self.bytes
+
+    @property
+    def bytes(self) -> int:
+        """Of all its files."""
+        return sum(size for _, size, _, _ in self.entries[0].files)
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """todo: in the order of names. kept: entries that stand, with why. problems: drives that cannot be read, with the
-    reason."""
+    """todo: in the order of names. kept: entries that stand. broken: entries that fail before they begin, with the reason.
+    problems: drives that are left out, with the reason."""
 
     todo: tuple[Planned, ...]
-    kept: tuple[tuple[Entry, str], ...]
+    kept: tuple[Entry, ...]
+    broken: tuple[Entry, ...]
     problems: tuple[tuple[str, str], ...]
 
 
@@ -70,43 +68,48 @@ class Summary:
     reasons: dict[str, int]
 
 
-def plan_batch(drives: Sequence[Assigned], methods: Sequence[str], folder: Path, resume: bool, retry_failed: bool) -> Plan:
+def plan_batch(
+    drives: Sequence[Assigned],
+    methods: Sequence[str],
+    destination: Destination,
+    seen: SeenFiles,
+    resume: bool,
+    retry_failed: bool,
+) -> Plan:
     """What is to be done. Raises LogError where the destination holds another batch and resume was not asked for."""
-    before = read_manifest(folder)
+    before = destination.before
     if before and not resume and not retry_failed:
-        raise LogError(f"{folder}: holds a batch already; go on with it by --resume, or choose another -o")
-    known = {stamp[0]: stamp for entry in before.values() for stamp in entry.files}
-    seen: dict[str, str] = {}
-    todo, kept, problems = [], [], []
+        raise LogError(f"{destination.out}: holds a batch already; go on with it by --resume, or choose another -o")
+    holders: dict[str, str] = {}
+    hashed: dict[tuple[int, str, str], str] = {}
+    todo, kept, broken, problems = [], [], [], []
     for assigned in drives:
-        try:
-            stamps = file_stamps(assigned, known)
-        except LogError as error:
-            problems.append((assigned.drive.name, str(error)))
+        name, stamps = assigned.drive.name, seen.stamps(assigned.drive.files)
+        content = " ".join(sorted(digest for _, _, _, digest in seen.stamps(assigned.drive.logs)))
+        holder = holders.setdefault(content, name) if content.strip() else name
+        if holder != name:
+            problems.append((name, f"holds the same as {holder}; it is left out"))
             continue
-        inputs = input_hash(stamps)
-        logs = {str(path) for path in assigned.drive.logs}
-        content = " ".join(sorted(digest for path, _, _, digest in stamps if path in logs))
-        if content and content in seen:
-            problems.append((assigned.drive.name, f"holds the same as {seen[content]}; it is left out"))
-            continue
-        seen[content] = assigned.drive.name
+        problem = seen.problem(assigned.drive.files)
         wanted, reasons = [], []
         for method in methods or (assigned.config.filter.name,):
-            made = config_hash(assigned, method)
-            entry = Entry(assigned.drive.name, method, inputs, made, code_version(), stamps, "planned")
-            why = _why(before.get(entry.key), entry, folder, retry_failed)
-            if why:
+            key = (id(assigned.config), assigned.vehicle, method)
+            made = hashed[key] = hashed.get(key) or config_hash(assigned, method)
+            entry = Entry(name, method, input_hash(stamps), made, code_version(), stamps, "planned")
+            why = _why(before.get(entry.key), entry, destination, retry_failed)
+            if problem:
+                broken.append(replace(entry, status="failed", reason=problem))
+            elif why:
                 wanted.append(entry)
                 reasons.append(why)
             else:
-                kept.append((before[entry.key], "as it was"))
+                kept.append(before[entry.key])
         if wanted:
             todo.append(Planned(assigned, tuple(wanted), "; ".join(dict.fromkeys(reasons))))
-    return Plan(tuple(todo), tuple(kept), tuple(problems))
+    return Plan(tuple(todo), tuple(kept), tuple(broken), tuple(problems))
 
 
-def _why(old: Entry | None, new: Entry, folder: Path, retry_failed: bool) -> str:
+def _why(old: Entry | None, new: Entry, destination: Destination, retry_failed: bool) -> str:
     """Why a job is to be done, empty where what there is stands."""
     if old is None:
         return "new"
@@ -116,59 +119,102 @@ def _why(old: Entry | None, new: Entry, folder: Path, retry_failed: bool) -> str
         return ", ".join(words[name] for name in changed)
     if old.status == "failed":
         return "failed before" if retry_failed else ""
-    return "" if (folder / "drives" / new.drive / new.method / "report.json").exists() else "its output is gone"
+    return "" if destination.has(new.drive, new.method) else "its output is gone"
 
 
-def run_batch(plan: Plan, folder: Path, executor: Executor, budget: float, tell: Tell) -> Summary:
-    """Does what is planned, records each outcome as it comes, and writes manifest, catalogue and index when all are in."""
-    (folder / "drives").mkdir(parents=True, exist_ok=True)
-    clear_parts(folder / "drives")
-    log = _Log(folder / "log")
-    entries = {entry.key: entry for entry, _ in plan.kept}
-    jobs = [_job(planned, folder) for planned in plan.todo]
-    by_name = {planned.assigned.drive.name: planned for planned in plan.todo}
-    done = failed = 0
-    reasons: dict[str, int] = {}
-    log.write({"event": "begin", "jobs": len(jobs), "kept": len(plan.kept)})
-    for drive, reason in plan.problems:
-        tell({"event": "left out", "drive": drive, "reason": reason})
-        log.write({"event": "left out", "drive": drive, "reason": reason})
-    for number, (job, outcomes, lost) in enumerate(
-        executor.run(run_job, jobs, [planned.memory for planned in plan.todo], budget), start=1
-    ):
-        for entry in by_name[job.drive].entries:
+def run_batch(plan: Plan, destination: Destination, seen: SeenFiles, executor: Executor, budget: float, tell: Tell) -> Summary:
+    """Does what is planned, records each outcome as it comes, and writes manifest, catalogue and index when all are in. Raises
+    LogError where the destination cannot be written."""
+    with destination.open() as manifest:
+        work = _Work(plan, destination, manifest, tell)
+        for drive, reason in plan.problems:
+            work.report({"event": "left out", "drive": drive, "reason": reason})
+        for entry in plan.broken:
+            work.record(entry, None)
+        jobs = [_job(planned, destination.out) for planned in plan.todo]
+        for job, outcomes, lost in executor.run(run_job, jobs, [one.memory for one in plan.todo], budget, work.start):
+            work.end(job, outcomes, lost)
+        destination.finish(work.entries.values(), seen)
+        return work.summary()
+
+
+class _Work:
+    """A batch that runs: what has ended, and what is told of it."""
+
+    def __init__(self, plan: Plan, destination: Destination, manifest: OpenManifest, tell: Tell) -> None:
+        self._destination, self._manifest, self._tell = destination, manifest, tell
+        self.entries = {entry.key: entry for entry in plan.kept}
+        self._kept = len(plan.kept)
+        self._planned = {planned.assigned.drive.name: planned for planned in plan.todo}
+        self._bytes = sum(planned.bytes for planned in plan.todo)
+        self._bytes_done = 0.0
+        self._drives_done = self._done = self._failed = 0
+        self._reasons: dict[str, int] = {}
+        self._log = _Log(destination.here / "log")
+        self._log.write({"event": "begin", "jobs": len(plan.todo), "kept": self._kept})
+
+    def start(self, job: Job) -> None:
+        """A worker has a drive now."""
+        self.report({"event": "started", "drive": job.drive})
+
+    def end(self, job: Job, outcomes: list[Outcome] | None, lost: str) -> None:
+        """A drive has ended, by itself or with its worker."""
+        planned = self._planned[job.drive]
+        self._bytes_done += planned.bytes
+        self._drives_done += 1
+        for entry in planned.entries:
             outcome = None if outcomes is None else next(one for one in outcomes if one.method == entry.method)
             reason = lost if outcome is None else outcome.reason
-            ended = Entry(
-                *(entry.drive, entry.method, entry.inputs, entry.config, entry.code, entry.files),
-                *("failed" if reason else "done", reason, {} if outcome is None else outcome.row),
-            )
-            entries[ended.key] = ended
-            append_entry(folder, ended)
-            done, failed = done + (not reason), failed + bool(reason)
-            if reason:
-                kind = _kind(reason)
-                reasons[kind] = reasons.get(kind, 0) + 1
-            told = {"event": ended.status, "drive": ended.drive, "method": ended.method, "reason": reason}
-            tell({**told, "number": number, "of": len(jobs)})
-            log.write({**told, "timing_s": {} if outcome is None else outcome.timing_s})
-    write_manifest(folder, entries.values())
-    write_catalogue(folder, entries.values())
-    write_index(folder, entries.values())
-    log.write({"event": "end", "done": done, "failed": failed})
-    return Summary(done, failed, len(plan.kept), reasons)
+            row = {} if outcome is None else outcome.row
+            ended = replace(entry, status="failed" if reason else "done", reason=reason, row=row)
+            self.record(ended, outcome)
+        self._destination.push()
+
+    def record(self, entry: Entry, outcome: Outcome | None) -> None:
+        """An entry of the manifest as it is now."""
+        self.entries[entry.key] = entry
+        self._manifest.add(entry)
+        self._done += entry.status == "done"
+        if entry.status == "failed":
+            self._failed += 1
+            kind = _kind(entry.reason)
+            self._reasons[kind] = self._reasons.get(kind, 0) + 1
+        told = {"event": entry.status, "drive": entry.drive, "method": entry.method, "reason": entry.reason}
+        self._tell({**told, "number": self._drives_done, "of": len(self._planned), "left_s": self._left_s()})
+        trace = {"traceback": outcome.trace} if outcome is not None and outcome.trace else {}
+        self._log.write({**told, "timing_s": {} if outcome is None else outcome.timing_s, **trace})
+
+    def report(self, told: dict[str, Any]) -> None:
+        """Tells it and writes it to the log."""
+        self._tell(told)
+        self._log.write(told)
+
+    def summary(self) -> Summary:
+        """Of all that has ended."""
+        self._log.write({"event": "end", "done": self._done, "failed": self._failed})
+        return Summary(self._done, self._failed, self._kept, self._reasons)
+
+    def _left_s(self) -> float | None:
+        """By the bytes of logs that are done and those that are not, None before the first."""
+        if not self._bytes_done:
+            return None
+        return round(self._log.after_s * (self._bytes - self._bytes_done) / self._bytes_done, 1)
 
 
-def _job(planned: Planned, folder: Path) -> Job:
+def _job(planned: Planned, out: Path) -> Job:
     assigned = planned.assigned
     config = assigned.config
     if assigned.drive.reference is not None and config.input.reference.file is None:
-        reference = config.input.reference.model_copy(update={"file": assigned.drive.reference.resolve()})
+        reference = config.input.reference.model_copy(update={"file": _absolute(assigned.drive.reference)})
         config = config.model_copy(update={"input": config.input.model_copy(update={"reference": reference})})
     configs = tuple((entry.method, _by_method(config, entry.method)) for entry in planned.entries)
-    place = folder / "drives" / assigned.drive.name
+    place = out / "drives" / assigned.drive.name
     logs = tuple(str(path) for path in assigned.drive.logs)
-    return Job(assigned.drive.name, logs, configs, str(place), assigned.vehicle)
+    return Job(assigned.drive.name, logs, configs, str(place), assigned.vehicle, planned.entries[0].files)
+
+
+def _absolute(path: Path) -> Path:
+    return path if is_address(path) else path.resolve()
 
 
 def _by_method(config: Config, method: str) -> Config:
@@ -192,7 +238,12 @@ class _Log:
         self._path = folder / f"{stamp}-{os.getpid()}.jsonl"
         self._begin = time.perf_counter()
 
+    @property
+    def after_s(self) -> float:
+        """Since the batch began."""
+        return time.perf_counter() - self._begin
+
     def write(self, values: dict[str, Any]) -> None:
         """Adds a line."""
         with self._path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps({"after_s": round(time.perf_counter() - self._begin, 3), **values}) + "\n")
+            file.write(json.dumps({"after_s": round(self.after_s, 3), **values}) + "\n")

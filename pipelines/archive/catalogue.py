@@ -11,6 +11,7 @@ import numpy as np
 from navreplay.timeline import Floats, LogError
 from pipelines.archive.manifest import Entry
 from pipelines.drive.headline import FIGURES
+from pipelines.files.remote import local
 from pipelines.files.whole_file import write_whole
 
 if TYPE_CHECKING:
@@ -66,11 +67,13 @@ def read_catalogue(folder: Path) -> "pandas.DataFrame":
     """The catalogue of a destination. Raises LogError where there is none."""
     from pyarrow import parquet
 
-    path = folder / NAME
+    path = local(folder, NAME)
     try:
         return parquet.read_table(path).to_pandas()
     except (OSError, ValueError) as error:
-        raise LogError(f"{path}: no catalogue can be read; is {folder} what `navreplay batch -o` wrote? ({error})") from error
+        raise LogError(
+            f"{folder / NAME}: no catalogue can be read; is {folder} what `navreplay batch -o` wrote? ({error})"
+        ) from error
 
 
 _TOKEN = re.compile(r"\s*(?:(?P<number>-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?)|(?P<word>[A-Za-z_]\w*)|(?P<text>'[^']*'|\"[^\"]*\")"

@@ -9,6 +9,7 @@ import numpy as np
 from navreplay.geodesy.earth import ned_between
 from navreplay.timeline import Floats, LogError
 from pipelines.archive.catalogue import read_catalogue
+from pipelines.files.remote import local
 from pipelines.trajectory.solution_csv import SolutionTable, read_solution_csv
 
 __all__ = ["Difference", "DriveChange", "FigureChange", "compare_archives"]
@@ -99,7 +100,7 @@ def _compare(
         what = {("done", "failed"): "fails now", ("failed", "done"): "works now"}.get(states, "same")
         return DriveChange(drive, method, what, None, None, None, {}, causes)
     separation = _separate(
-        *(read_solution_csv(folder / "drives" / drive / method / "solution.csv") for folder in (before, after))
+        *(read_solution_csv(local(folder, f"drives/{drive}/{method}/solution.csv")) for folder in (before, after))
     )
     figures = {name: (_known(old[name]), _known(new[name])) for name in FIGURES}
     same = separation is not None and separation[0] == 0 and all(a == b for a, b in figures.values())

@@ -5,7 +5,7 @@ sorted, when a batch ends; a line cut short by a crash is passed over.
 """
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field, fields
 from functools import cache
 from hashlib import sha256
@@ -14,16 +14,15 @@ from pathlib import Path
 from typing import Any
 
 from navreplay.timeline import LogError
-from pipelines.archive.rules import Assigned
+from pipelines.archive.sources.rules import Assigned
 from pipelines.config.spec import dump_toml
 from pipelines.files.whole_file import write_whole
 
 __all__ = [
     "Entry",
-    "append_entry",
+    "OpenManifest",
     "code_version",
     "config_hash",
-    "file_stamps",
     "input_hash",
     "read_manifest",
     "write_manifest",
@@ -31,7 +30,6 @@ __all__ = [
 
 NAME = "manifest.jsonl"
 _SCHEMA = 1
-_BLOCK = 1 << 20
 _PACKAGES = ("navreplay", "importers", "pipelines")
 
 
@@ -78,32 +76,6 @@ def config_hash(assigned: Assigned, method: str) -> str:
     return sha256(text.encode()).hexdigest()[:16]
 
 
-def file_stamps(assigned: Assigned, known: Mapping[str, tuple[str, int, int, str]]) -> tuple[tuple[str, int, int, str], ...]:
-    """Path, size, time of change and SHA-256 of each input; a file that is as it was known is not read again. Raises LogError
-    for one that cannot be read."""
-    stamps = []
-    for path in assigned.drive.files:
-        for part in sorted(one for one in path.rglob("*") if one.is_file()) if path.is_dir() else [path]:
-            try:
-                status = part.stat()
-                before = known.get(str(part))
-                if before is not None and before[1:3] == (status.st_size, status.st_mtime_ns):
-                    stamps.append(before)
-                else:
-                    stamps.append((str(part), status.st_size, status.st_mtime_ns, _digest(part)))
-            except OSError as error:
-                raise LogError(f"{part}: cannot be read: {error.strerror}") from error
-    return tuple(stamps)
-
-
-def _digest(path: Path) -> str:
-    digest = sha256()
-    with path.open("rb") as file:
-        while block := file.read(_BLOCK):
-            digest.update(block)
-    return digest.hexdigest()
-
-
 def input_hash(stamps: Iterable[tuple[str, int, int, str]]) -> str:
     """Of what files hold and what they are called, wherever they lie."""
     text = "\n".join(f"{Path(path).name} {digest}" for path, _, _, digest in stamps)
@@ -141,15 +113,26 @@ def _check_schema(path: Path, data: object) -> None:
         raise LogError(f"{path}: is no manifest of this version of navreplay; choose another -o, or move it away")
 
 
-def append_entry(folder: Path, entry: Entry) -> None:
-    """Adds a line, with the head of the file where it is new."""
-    path = folder / NAME
-    text = "" if path.exists() and path.stat().st_size else f"{json.dumps({'navreplay_manifest': _SCHEMA})}\n"
-    if not text and not path.read_bytes().endswith(b"\n"):
-        write_manifest(folder, read_manifest(folder).values())
-    with path.open("a", encoding="utf-8") as file:
-        file.write(f"{text}{_line(entry)}\n")
-        file.flush()
+class OpenManifest:
+    """The manifest of a batch that runs: entries are added as jobs end. Raises OSError."""
+
+    def __init__(self, folder: Path) -> None:
+        path = folder / NAME
+        if path.exists():
+            write_manifest(folder, read_manifest(folder).values())  # whole lines, whatever a crash left of the last
+        self._file = path.open("a", encoding="utf-8")
+        if not path.stat().st_size:
+            self._file.write(f"{json.dumps({'navreplay_manifest': _SCHEMA})}\n")
+            self._file.flush()
+
+    def add(self, entry: Entry) -> None:
+        """Adds a line, which is there at once."""
+        self._file.write(f"{_line(entry)}\n")
+        self._file.flush()
+
+    def close(self) -> None:
+        """No entry follows."""
+        self._file.close()
 
 
 def write_manifest(folder: Path, entries: Iterable[Entry]) -> None:

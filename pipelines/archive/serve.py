@@ -8,6 +8,7 @@ from typing import Any
 
 from navreplay.timeline import LogError
 from pipelines.archive.catalogue import read_catalogue
+from pipelines.files.remote import local
 
 __all__ = ["open_server", "serve"]
 
@@ -40,7 +41,7 @@ def open_server(folder: Path, port: int | None = None, host: str = "127.0.0.1") 
         raise LogError("serving an archive needs the extra [catalog]: pip install 'navreplay[catalog]'") from error
     table = read_catalogue(folder)
     done = table[table["status"] == "done"]
-    paths = [(folder / "drives" / row.drive / row.method / "recording.rrd", row.method) for row in done.itertuples()]
+    paths = [(local(folder, f"drives/{row.drive}/{row.method}/recording.rrd"), row.method) for row in done.itertuples()]
     there = [(path.resolve(), method) for path, method in paths if path.exists()]
     if not there:
         raise LogError(f"{folder}: holds no recordings; was it made with output.recording = false?")

@@ -8,6 +8,7 @@ import numpy as np
 
 from navreplay.timeline import LogError
 from pipelines.archive.catalogue import read_catalogue
+from pipelines.files.remote import local
 
 if TYPE_CHECKING:
     import pandas
@@ -62,7 +63,7 @@ def _weighted(values: np.ndarray, weights: np.ndarray, share: float) -> float:
 def _outages(folder: Path, done: "pandas.DataFrame") -> list[dict[str, Any]]:
     ends: list[tuple[float, float]] = []
     for row in done.itertuples():
-        path = folder / "drives" / row.drive / row.method / "report.json"
+        path = local(folder, f"drives/{row.drive}/{row.method}/report.json")
         try:
             listed = json.loads(path.read_text(encoding="utf-8"))["outages"]["list"]
         except (OSError, ValueError, KeyError) as error:

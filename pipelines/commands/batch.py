@@ -3,21 +3,23 @@
 import argparse
 import json
 import os
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
-from typing import Any
 
+from importers.containers.remote import address_of
 from navreplay.filters.presets import build_method
 from navreplay.timeline import LogError
 from pipelines.archive.batch import Plan, Summary, plan_batch, run_batch
-from pipelines.archive.drives import find_drives
+from pipelines.archive.destination import Destination
 from pipelines.archive.executors import choose_executor
-from pipelines.archive.listing import list_files
-from pipelines.archive.rules import Assigned, assign, read_rules
+from pipelines.archive.manifest import code_version
+from pipelines.archive.progress import show_batch
+from pipelines.archive.sources.drives import find_drives
+from pipelines.archive.sources.listing import list_files
+from pipelines.archive.sources.rules import Assigned, assign, read_rules
+from pipelines.archive.sources.seen import SOURCES, SeenFiles
 from pipelines.commands.options import read_config
+from pipelines.files.remote import is_address, status_of
 
 __all__ = ["run"]
 
@@ -31,38 +33,63 @@ def run(arguments: argparse.Namespace) -> int | None:
     methods = tuple(arguments.filters.split(",")) if arguments.filters else ()
     for method in methods:
         build_method(method)
-    out = arguments.out.resolve()
-    for source in arguments.sources:
-        place = Path(source).resolve()
-        if place.is_dir() and (out == place or place in out.parents):
-            raise LogError(
-                f"-o {arguments.out} lies inside {source}, so its own results would be read as logs; choose a folder beside it"
-            )
+    _check_apart(arguments)
+    workers = arguments.workers or os.cpu_count() or 1
+    _check_reach(arguments, workers)
     files = [path for path in list_files(arguments.sources, arguments.match) if _within(path, arguments)]
     if not files:
         raise LogError(f"{', '.join(arguments.sources)}: holds no files{_restricted(arguments)}")
-    drives, others = find_drives(files, _root(arguments.sources), config.input)
+    destination = Destination(arguments.out)
+    seen = SeenFiles(config.input, code_version())
+    seen.read(destination.here / SOURCES)
+    drives, others = find_drives(files, _root(arguments.sources), seen)
     assigned = assign(drives, read_rules(arguments.rules), arguments.rules, config)
     if not assigned:
         listed = "; ".join(f"{path.name}: {why}" for path, why in list(others.items())[:3])
         raise LogError(
             f"{', '.join(arguments.sources)}: no drive was recognised among {len(files)} files ({listed or 'all are skipped'})"
         )
-    plan = plan_batch(assigned, methods, arguments.out, arguments.resume, arguments.retry_failed)
+    plan = plan_batch(assigned, methods, destination, seen, arguments.resume, arguments.retry_failed)
     budget = _memory() * _SHARE
     if arguments.dry_run:
         _show_plan(plan, assigned, others, budget, arguments)
         return None
-    executor = choose_executor(arguments.scheduler, arguments.workers or os.cpu_count() or 1)
-    with _progress(arguments, sum(len(planned.entries) for planned in plan.todo)) as tell:
-        summary = run_batch(plan, arguments.out, executor, budget, tell)
+    executor = choose_executor(arguments.scheduler, workers)
+    with show_batch(len(plan.todo), arguments.json, arguments.quiet) as tell:
+        summary = run_batch(plan, destination, seen, executor, budget, tell)
     _tell_summary(summary, plan, arguments)
     return 2 if summary.failed else None
 
 
+def _check_apart(arguments: argparse.Namespace) -> None:
+    """Raises LogError where the destination lies inside a source, or is a file."""
+    out = arguments.out if is_address(arguments.out) else arguments.out.resolve()
+    if out.is_file():
+        raise LogError(f"-o {arguments.out}: is a file, but -o names a folder for the results")
+    for source in arguments.sources:
+        place = Path(source) if is_address(Path(source)) else Path(source).resolve()
+        if (place.is_dir() or is_address(place)) and (out == place or place in out.parents):
+            raise LogError(
+                f"-o {arguments.out} lies inside {source}, so its own results would be read as logs; choose a folder beside it"
+            )
+
+
+def _check_reach(arguments: argparse.Namespace, workers: int) -> None:
+    """Raises LogError for an address that lives in this process alone while others are to work."""
+    apart = arguments.scheduler is not None or workers > 1
+    own = [one for one in (*arguments.sources, str(arguments.out)) if one.startswith("memory:")]
+    if apart and own:
+        raise LogError(f"{own[0]}: is the memory of this process, which other workers do not see; use --workers 1")
+
+
 def _within(path: Path, arguments: argparse.Namespace) -> bool:
-    changed = datetime.fromtimestamp(path.stat().st_mtime)
     since, until = arguments.since, arguments.until
+    if since is None and until is None:
+        return True
+    try:
+        changed = datetime.fromtimestamp(status_of(path)[1] / 1e9, since.tzinfo if since else until.tzinfo)
+    except OSError:
+        return True  # which is told where it is read
     return (since is None or changed >= since) and (until is None or changed <= until)
 
 
@@ -71,8 +98,11 @@ def _restricted(arguments: argparse.Namespace) -> str:
 
 
 def _root(sources: list[str]) -> Path:
-    folders = [Path(source) for source in sources if Path(source).is_dir()]
-    return folders[0] if len(folders) == 1 else Path(os.path.commonpath([Path(source).resolve() for source in sources]))
+    places = [Path(source) for source in sources]
+    folders = [place for place in places if place.is_dir() or (is_address(place) and not place.suffix)]
+    if len(folders) == 1 or any(map(is_address, places)):
+        return folders[0] if folders else places[0].parent
+    return Path(os.path.commonpath([Path(source).resolve() for source in sources]))
 
 
 def _memory() -> float:
@@ -106,34 +136,11 @@ def _show_plan(
             print(f"    {names}: {planned.why}; about {planned.memory / 1e9:.1f} GB")
     for name, reason in plan.problems:
         print(f"{name}: left out: {reason}")
+    for entry in plan.broken:
+        print(f"{entry.drive}: {entry.reason}")
     for path, why in others.items():
         print(f"{path}: {why}")
     print(f"{len(plan.todo)} of {len(assigned)} drives to process; workers share {budget / 1e9:.1f} GB")
-
-
-@contextmanager
-def _progress(arguments: argparse.Namespace, total: int) -> Iterator[Any]:
-    if arguments.json:
-        yield lambda values: print(json.dumps(values), flush=True)
-        return
-    if arguments.quiet:
-        yield lambda values: None
-        return
-    from tqdm import tqdm
-
-    with tqdm(total=total, unit="run", disable=None, leave=False) as bar:
-
-        def tell(values: dict[str, Any]) -> None:
-            """Moves the bar; failures stand above it."""
-            if values["event"] == "left out":
-                bar.write(f"{values['drive']}: left out: {values['reason']}", file=sys.stderr)
-                return
-            bar.update(1)
-            bar.set_postfix_str(values["drive"])
-            if values["reason"]:
-                bar.write(f"{values['drive']} ({values['method']}): {values['reason']}", file=sys.stderr)
-
-        yield tell
 
 
 def _tell_summary(summary: Summary, plan: Plan, arguments: argparse.Namespace) -> None:
@@ -147,4 +154,5 @@ def _tell_summary(summary: Summary, plan: Plan, arguments: argparse.Namespace) -
     print(f"{summary.done} done, {summary.failed} failed, {summary.skipped} as they were{left}")
     for reason, count in sorted(summary.reasons.items(), key=lambda one: -one[1]):
         print(f"  {count} x {reason}")
-    print(f"{arguments.out / 'index.html'}\n{arguments.out / 'catalog.parquet'}")
+    out = address_of(str(arguments.out)) or arguments.out
+    print(f"{out}/index.html\n{out}/catalog.parquet")

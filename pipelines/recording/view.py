@@ -1,6 +1,9 @@
 """recording.rrd: a run for the Rerun viewer, on the timelines ``elapsed`` (since the first row) and ``time`` (UTC)."""
 
+import errno
 import hashlib
+import os
+import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -25,6 +28,8 @@ __all__ = ["recording_id", "write_recording"]
 
 _APPLICATION = "navreplay"
 _ELLIPSOIDS = 200
+_ROOM = 1 << 20
+"""Bytes below which a disk counts as full."""
 _ASPECT, _MAP_ASPECT = 1.5, 2.1
 """Width over height of the two views, for the track to fit into."""
 _GRADE_LEVELS = {"good": "info", "fair": "warning", "poor": "error"}
@@ -48,7 +53,17 @@ def recording_id(result: RunResult) -> str:
 
 def write_recording(path: Path, result: RunResult, layer: tuple[str, str] | None = None) -> None:
     """Writes the recording with its layout. layer: the segment that it belongs to and its name there; its entities then lie
-    under that name, and its identity is the segment's instead of that of files and configuration."""
+    under that name, and its identity is the segment's instead of that of files and configuration. Raises OSError."""
+    try:
+        _write(path, result, layer)
+    except RuntimeError as error:  # the writer's thread tells of a full disk in no other way
+        full = shutil.disk_usage(path.parent).free < _ROOM
+        raise OSError(
+            errno.ENOSPC if full else errno.EIO, f"the recording: {os.strerror(errno.ENOSPC) if full else error}"
+        ) from error
+
+
+def _write(path: Path, result: RunResult, layer: tuple[str, str] | None) -> None:
     solution, described = result.solution, describe_verdict(result)
     origin = solution.lla[0]
     track = _local(origin, solution.lla)

@@ -12,9 +12,10 @@ from navreplay.timeline import LogError
 from pipelines import cli
 from pipelines.archive.catalogue import read_catalogue, select_rows, write_catalogue
 from pipelines.archive.difference import compare_archives
-from pipelines.archive.drives import ArchiveDrive, find_drives
 from pipelines.archive.index_page import write_index
 from pipelines.archive.manifest import Entry, read_manifest, write_manifest
+from pipelines.archive.sources.drives import ArchiveDrive, find_drives
+from pipelines.archive.sources.seen import SeenFiles
 from pipelines.config.spec import Config
 from synthetic_logs import SCENARIOS, simulate, with_duration, write
 
@@ -82,7 +83,7 @@ def test_no_name_leads_out_of_the_destination(tmp_path: Path, folder: str) -> No
     write(simulate(with_duration(SCENARIOS["car-short"], 20.0), 1), path)
     odd = tmp_path / "in" / folder.replace("/", "_").replace("..", "up") / ".." / "log.mcap"
     odd.parent.parent.mkdir(exist_ok=True, parents=True)
-    (drive,) = find_drives([path], Path("/"), Config().input)[0]
+    (drive,) = find_drives([path], Path("/"), SeenFiles(Config().input, ""))[0]
     destination = (tmp_path / "out" / drive.name).resolve()
     assert tmp_path / "out" in destination.parents
     assert ".." not in drive.name.split("/")

@@ -9,7 +9,7 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from navreplay.timeline import LogError
-from pipelines.archive.drives import ArchiveDrive
+from pipelines.archive.sources.drives import ArchiveDrive
 from pipelines.config.spec import Config, load_config
 
 __all__ = ["Assigned", "Rules", "assign", "read_rules"]

@@ -2,13 +2,11 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from importers.formats import known_formats, open_log
-from importers.settings import InputSettings
-from navreplay.timeline import LogError
-from pipelines.archive.spans import AIDS, Span, roles_of, shared_time, time_span
+from pipelines.archive.sources.seen import SeenFiles
+from pipelines.archive.sources.spans import AIDS, Span, shared_time
 
 __all__ = ["ArchiveDrive", "find_drives"]
 
@@ -21,13 +19,12 @@ _SPLIT_GAP_NS, _SPLIT_OVERLAP_NS = 60 * 10**9, 5 * 10**9
 @dataclass(frozen=True, slots=True)
 class ArchiveDrive:
     """name: of its folder in the destination, unique. logs: its files, in order. reference: beside them, or None. why: the
-    files belong together, in words. problem: why it cannot be processed, empty where it can."""
+    files belong together, in words."""
 
     name: str
     logs: tuple[Path, ...]
     reference: Path | None = None
     why: str = ""
-    problem: str = ""
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -37,16 +34,21 @@ class ArchiveDrive:
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """A log of an archive. roles: what its channels can serve as. span: its first and last time [ns], None where unknown."""
+    """A log of an archive. roles: what its channels can serve as. book: that knows it."""
 
     path: Path
     roles: frozenset[str]
-    span: Span | None = None
+    book: SeenFiles
 
     @property
     def complete(self) -> bool:
         """Whether it is a drive by itself."""
         return "broken" in self.roles or ("imu" in self.roles and bool(self.roles & AIDS))
+
+    @property
+    def span(self) -> Span | None:
+        """When it was made, None where unknown; asked for only where it matters, since it is read for it."""
+        return self.book.span(self.path)
 
     @property
     def stem(self) -> str:
@@ -69,14 +71,14 @@ class _Group:
         return (min(first for first, _ in known), max(last for _, last in known)) if known else None
 
 
-def find_drives(files: Sequence[Path], root: Path, settings: InputSettings) -> tuple[list[ArchiveDrive], dict[Path, str]]:
+def find_drives(files: Sequence[Path], root: Path, book: SeenFiles) -> tuple[list[ArchiveDrive], dict[Path, str]]:
     """The drives that files make, their names relative to root, and what is no log with the reason.
 
     A file that holds an IMU and something that aids it is a drive by itself; files of one name that count on and follow each
     other in time are splits of one; what else lies in a folder is joined by the first part of its name, else by the time it
     shares with one drive alone.
     """
-    parts, references, others = _sort(files, settings)
+    parts, references, others = _sort(files, book)
     by_folder: dict[Path, list[_Part]] = {}
     for part in parts:
         by_folder.setdefault(part.path.parent, []).append(part)
@@ -89,26 +91,16 @@ def find_drives(files: Sequence[Path], root: Path, settings: InputSettings) -> t
     return _unique(drives), others
 
 
-def _sort(files: Sequence[Path], settings: InputSettings) -> tuple[list[_Part], list[Path], dict[Path, str]]:
+def _sort(files: Sequence[Path], book: SeenFiles) -> tuple[list[_Part], list[Path], dict[Path, str]]:
     parts, references, others = [], [], {}
-    suffixes = {suffix for known in known_formats() for suffix in known.extensions}
     for path in files:
-        if path.is_file() and path.suffix.lower() not in suffixes | {".gz", ".zst", ".bz2", ".zip"}:
-            others[path] = "no extension of a log"
-            continue
-        try:
-            log = open_log(path, settings)
-            roles = roles_of(log)
-        except LogError as error:
-            if path.suffix.lower() in (".csv", ".txt", ".mat") and "unknown format" in str(error):
-                others[path] = "a table without a mapping"
-            else:
-                parts.append(_Part(path, frozenset({"broken"})))
-            continue
-        if _REFERENCE.search(path.stem) or roles == {"reference"}:
+        seen = book.look(path)
+        if seen.other:
+            others[path] = seen.other
+        elif "broken" not in seen.roles and (_REFERENCE.search(path.stem) or seen.roles == ("reference",)):
             references.append(path)
-        elif roles:
-            parts.append(_Part(path, roles, time_span(log)))
+        elif seen.roles:
+            parts.append(_Part(path, frozenset(seen.roles), book))
         else:
             others[path] = "nothing in it serves navigation"
     return parts, references, others
@@ -229,6 +221,9 @@ def _unique(drives: Sequence[ArchiveDrive]) -> list[ArchiveDrive]:
     unique = []
     for same in counts.values():
         for number, drive in enumerate(same):
-            name = drive.name if number == 0 else f"{drive.name}~{number + 1}"
-            unique.append(ArchiveDrive(name, drive.logs, drive.reference, drive.why, drive.problem))
+            if number == 0:
+                unique.append(drive)
+            else:
+                why = f"{drive.why}; {same[0].name} is the name of another drive"
+                unique.append(replace(drive, name=f"{drive.name}~{number + 1}", why=why))
     return sorted(unique, key=lambda drive: drive.name)

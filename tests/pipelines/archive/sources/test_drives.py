@@ -8,8 +8,9 @@ from mcap.reader import make_reader
 from mcap.writer import Writer
 
 from importers.settings import InputSettings
-from pipelines.archive.drives import ArchiveDrive, find_drives
-from pipelines.archive.listing import list_files
+from pipelines.archive.sources.drives import ArchiveDrive, find_drives
+from pipelines.archive.sources.listing import list_files
+from pipelines.archive.sources.seen import SeenFiles
 from synthetic_logs import SCENARIOS, simulate, with_duration, write
 
 
@@ -41,7 +42,7 @@ def cut(source: Path, target: Path, from_s: float, to_s: float, shift_s: float =
 
 
 def find(folder: Path) -> dict[str, ArchiveDrive]:
-    return {drive.name: drive for drive in find_drives(list_files([str(folder)]), folder, InputSettings())[0]}
+    return {drive.name: drive for drive in find_drives(list_files([str(folder)]), folder, SeenFiles(InputSettings(), ""))[0]}
 
 
 def names(drive: ArchiveDrive) -> list[str]:
@@ -52,7 +53,7 @@ def test_a_drive_is_found_with_its_reference(logs: Path, tmp_path: Path) -> None
     for name in ("one.mcap", "one.truth.csv", "two.imu.csv", "two.fix.csv", "two.truth.csv"):
         shutil.copy(logs / name, tmp_path / name)
     (tmp_path / "notes.md").write_text("no log")
-    drives, others = find_drives(list_files([str(tmp_path)]), tmp_path, InputSettings())
+    drives, others = find_drives(list_files([str(tmp_path)]), tmp_path, SeenFiles(InputSettings(), ""))
     found = {drive.name: (names(drive), drive.reference and drive.reference.name) for drive in drives}
     assert found == {"one": (["one.mcap"], "one.truth.csv"), "two": (["two.fix.csv", "two.imu.csv"], "two.truth.csv")}
     assert [path.name for path in others] == ["notes.md"]
