@@ -45,7 +45,7 @@ class Job:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """Of one method: the reason why it failed, empty where it did not; the row of the catalogue; seconds by stage; the traceback
+    """Of one method: the reason why it failed, empty where it did not; the row of the catalogue; seconds by stage; trace:
     where the program itself is at fault."""
 
     method: str
