@@ -40,7 +40,7 @@ from importers.text.unix_compress import is_compressed, unpack
 from importers.trajectories.gpx import is_gpx, read_gpx
 from importers.trajectories.sbet import is_sbet, read_sbet
 from navreplay.geodesy.time_scales import LEAP_SECONDS
-from navreplay.plugins import load_plugins, told
+from navreplay.plugins import load_plugins, told, told_apart
 from navreplay.timeline import LogError
 
 __all__ = ["FORMATS", "Format", "known_formats", "open_log"]
@@ -69,7 +69,7 @@ def known_formats() -> tuple[Format, ...]:
 def _added_formats() -> list[Format]:
     names = {known.name for known in FORMATS}
     added = (known for known in load_plugins("navreplay.formats", Format) if isinstance(known, Format))
-    return [replace(known, open=_guarded(known)) for known in added if known.name not in names]
+    return [replace(known, open=_guarded(known)) for known in told_apart("navreplay.formats", added, names)]
 
 
 def _guarded(added: Format) -> Callable[[str, bytes, InputSettings], Log | None]:

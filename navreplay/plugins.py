@@ -5,12 +5,18 @@ A package registers them in its pyproject.toml, for example
     my-method = "my_package.my_file:MY_PRESET"
 """
 
+import logging
+from collections.abc import Collection, Iterable
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
+from typing import TypeVar
 
 from navreplay.timeline import LogError
 
-__all__ = ["load_plugins", "told"]
+__all__ = ["load_plugins", "told", "told_apart"]
+
+T = TypeVar("T")
+_LOGGER = logging.getLogger("navreplay")
 
 
 @cache
@@ -18,6 +24,25 @@ def load_plugins(group: str, *kinds: type) -> tuple[object, ...]:
     """The objects of a group, each an instance of one of kinds, in the order of their names. Raises LogError with package and
     object for one that cannot be loaded, or that is something else."""
     return tuple(_load(point, kinds) for point in sorted(entry_points(group=group), key=lambda point: point.name))
+
+
+def told_apart(group: str, added: Iterable[T], known: Collection[str]) -> list[T]:
+    """Those whose name no built-in has; the others are left out, with a line of warning each, once."""
+    kept = []
+    for one in added:
+        name = str(getattr(one, "name", ""))
+        if name in known:
+            _warn_of_name(group, name)
+        else:
+            kept.append(one)
+    return kept
+
+
+@cache
+def _warn_of_name(group: str, name: str) -> None:
+    _LOGGER.warning(
+        f"warning: a plug-in of '{group}' is named '{name}' as one that is built in, which counts; rename the plug-in"
+    )
 
 
 def _load(point: EntryPoint, kinds: tuple[type, ...]) -> object:

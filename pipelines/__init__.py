@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from navreplay.timeline import LogError
     from pipelines.config.spec import Config, load_config
     from pipelines.drive.process import Drive, read_drive
-    from pipelines.notebook import Result, choose_filter, configure, filter_drive, open_run
+    from pipelines.notebook import Result, choose_filter, compare, configure, filter_drive, open_run
     from pipelines.outputs import write_outputs
 
 __all__ = [
@@ -25,6 +25,7 @@ __all__ = [
     "LogError",
     "Result",
     "choose_filter",
+    "compare",
     "configure",
     "filter_drive",
     "load_config",
@@ -39,6 +40,7 @@ _HOME = {
     "LogError": "navreplay.timeline",
     "Result": "pipelines.notebook",
     "choose_filter": "pipelines.notebook",
+    "compare": "pipelines.notebook",
     "configure": "pipelines.notebook",
     "filter_drive": "pipelines.notebook",
     "load_config": "pipelines.config.spec",

@@ -166,8 +166,10 @@ def _add_formats(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
 
 def _add_batch(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     parser = _add_command(commands, "batch", "process an archive of drives, with a catalogue of all")
-    parser.add_argument("sources", metavar="SOURCE", nargs="+", help="folders, logs, patterns, or lists of them (.lst)")
-    parser.add_argument("-o", "--out", metavar="DEST", type=Path, required=True, help="folder for the results")
+    parser.add_argument(
+        "sources", metavar="SOURCE", nargs="+", help="folders, logs, addresses, patterns, or lists of them (.lst)"
+    )
+    parser.add_argument("-o", "--out", metavar="DEST", type=Path, required=True, help="folder or address for the results")
     parser.add_argument("-c", "--config", metavar="FILE", type=Path, help="configuration in TOML for all drives")
     parser.add_argument(
         "--rules", metavar="FILE", type=Path, help="TOML with what the archive cannot tell: configurations, joins"
@@ -206,6 +208,7 @@ def _add_diff(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -
     parser.add_argument(
         "--tolerance", metavar="M", type=float, default=0.01, help="exit 1 beyond this separation (default 0.01 m)"
     )
+    parser.add_argument("--html", metavar="FILE", type=Path, help="write it as a page, with the separations drawn")
     _add_json(parser)
 
 

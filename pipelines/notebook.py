@@ -4,18 +4,22 @@ import json
 from dataclasses import dataclass, fields
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from navreplay.filters.presets import build_method
 from navreplay.timeline import LogError
 from pipelines.config.spec import Config, validate
 from pipelines.drive import process
+from pipelines.drive.headline import FIGURES, headline
 from pipelines.drive.process import Drive
 from pipelines.drive.result import RunResult
 from pipelines.frames import Frame, TabularSolution, error_frame, innovation_frame
 from pipelines.trajectory.solution_csv import read_columns
 
-__all__ = ["FinishedRun", "Result", "choose_filter", "configure", "filter_drive", "open_run"]
+if TYPE_CHECKING:
+    import pandas
+
+__all__ = ["FinishedRun", "Result", "choose_filter", "compare", "configure", "filter_drive", "open_run"]
 
 
 def configure(**sections: dict[str, Any]) -> Config:
@@ -61,6 +65,24 @@ def filter_drive(drive: Drive, config: Config) -> Result:
     result = process.filter_drive(drive, config)
     parts = {field.name: getattr(result, field.name) for field in fields(RunResult)}
     return Result(**{**parts, "solution": TabularSolution.of(result.solution)})
+
+
+def compare(drive: Drive, config: Config, *names: str) -> "pandas.DataFrame":
+    """The headline figures of several methods on one drive, a row each under its name; a method that cannot run has its
+    ``reason`` in place of figures. Raises LogError for one that does not exist."""
+    import pandas
+
+    configs = [choose_filter(config, name) if name != config.filter.name else config for name in names]
+    rows = {name: _headline(drive, one) for name, one in zip(names, configs, strict=True)}
+    columns = [name for name in FIGURES if any(row.get(name) is not None for row in rows.values())]
+    return pandas.DataFrame.from_dict(rows, orient="index", columns=[*columns, "reason"])
+
+
+def _headline(drive: Drive, config: Config) -> dict[str, Any]:
+    try:
+        return {**headline(process.filter_drive(drive, config)), "reason": ""}
+    except LogError as error:
+        return {"reason": str(error)}
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -48,7 +48,7 @@ def test_the_python_of_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyP
     write(simulate(with_duration(SCENARIOS["car-short"], 90.0), 1), tmp_path / "drive.mcap")
     (tmp_path / "drive.toml").write_text(_CONFIG)
     blocks = re.findall(r"```python\n(.*?)```", (ROOT / "docs/python.md").read_text(encoding="utf-8"), re.DOTALL)
-    assert len(blocks) == 7
+    assert len(blocks) == 8
     names: dict[str, object] = {}
     with contextlib.redirect_stdout(io.StringIO()) as printed:
         for block in blocks:

@@ -31,7 +31,7 @@ from navreplay.filters.weights import Immae, Mmae, MmaeFloor
 from navreplay.moments.cubature import Cubature
 from navreplay.moments.invariant import Invariant
 from navreplay.moments.linearised import Linearised, MomentRule
-from navreplay.plugins import load_plugins
+from navreplay.plugins import load_plugins, told_apart
 from navreplay.timeline import LogError
 from navreplay.update.adapter import NoiseAdapter
 
@@ -167,8 +167,9 @@ PRESETS: dict[str, Preset | BankPreset] = {
 
 def known_methods() -> dict[str, Preset | BankPreset]:
     """The presets by name, and behind them those that other packages register under `navreplay.filters`; of equal names the one
-    here counts. Raises LogError for a plug-in that cannot be loaded."""
-    plugins = (one for one in load_plugins("navreplay.filters", Preset, BankPreset) if isinstance(one, Preset | BankPreset))
+    here counts, with a warning. Raises LogError for a plug-in that cannot be loaded."""
+    loaded = load_plugins("navreplay.filters", Preset, BankPreset)
+    plugins = told_apart("navreplay.filters", (one for one in loaded if isinstance(one, Preset | BankPreset)), PRESETS)
     return {one.name: one for one in plugins} | PRESETS
 
 

@@ -17,10 +17,10 @@ from pipelines.files.whole_file import write_whole
 if TYPE_CHECKING:
     import pandas
 
-__all__ = ["COLUMNS", "read_catalogue", "select_rows", "track_of", "write_catalogue"]
+__all__ = ["COLUMNS", "points_of", "read_catalogue", "select_rows", "track_of", "write_catalogue"]
 
 NAME = "catalog.parquet"
-_TRACK_POINTS = 60
+_TRACK_POINTS = 48
 
 COLUMNS: dict[str, str] = {
     "drive": "str",
@@ -38,10 +38,15 @@ COLUMNS: dict[str, str] = {
 """Columns with their types. inputs, config and code are the hashes of the manifest."""
 
 
-def track_of(degrees: Floats) -> list[list[float]]:
-    """Some points of a track (k, 2) [deg], to a metre, for a small picture."""
+def track_of(degrees: Floats) -> str:
+    """Some points of a track (k, 2) [deg], to a metre, for a small picture: one text, since an archive has many."""
     some = degrees[np.unique(np.linspace(0, len(degrees) - 1, _TRACK_POINTS).astype(np.intp))]
-    return [[round(float(lat), 5), round(float(lon), 5)] for lat, lon in some]
+    return " ".join(f"{lat:.5f},{lon:.5f}" for lat, lon in some)
+
+
+def points_of(track: str) -> Floats:
+    """(k, 2) [deg] of such a text."""
+    return np.array([point.split(",") for point in track.split()], dtype=np.float64).reshape(-1, 2)
 
 
 def write_catalogue(folder: Path, entries: Iterable[Entry]) -> None:

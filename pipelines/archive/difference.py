@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from navreplay.geodesy.earth import ned_between
-from navreplay.timeline import Floats, LogError
+from navreplay.timeline import Floats, LogError, Times
 from pipelines.archive.catalogue import read_catalogue
 from pipelines.files.remote import local
-from pipelines.trajectory.solution_csv import SolutionTable, read_solution_csv
+from pipelines.trajectory.solution_csv import read_solution_csv
 
-__all__ = ["Difference", "DriveChange", "FigureChange", "compare_archives"]
+__all__ = ["Difference", "DriveChange", "FigureChange", "Separation", "compare_archives", "separate"]
 
 FIGURES = (
     "horizontal_rms_m",
@@ -29,11 +29,25 @@ _SURE = 2.0
 """Standard errors of a mean of paired changes beyond which it is no chance (95 %)."""
 
 
+_UNKNOWN = (None, None, None, None, None)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Separation:
+    """t_ns: (n,), GPS. lla: (n, 3) before [rad, rad, m]. ned_m: (n, 3) after minus before. track_m: (n, 3) NED of before, from
+    its first position."""
+
+    t_ns: Times
+    lla: Floats
+    ned_m: Floats
+    track_m: Floats
+
+
 @dataclass(frozen=True, slots=True)
 class DriveChange:
     """One drive by one method. what: ``same``, ``changed``, ``only in A``, ``only in B``, ``fails now``, ``works now``.
-    largest_m, rms_m: separation of the trajectories, and at_s: where it is largest, from the start; None where they cannot be
-    compared. figures: by name, before and after. causes: which hashes differ."""
+    largest_m, rms_m: separation of the trajectories, and at_s, lat_deg, lon_deg: when, from the start, and where it is largest;
+    None where they cannot be compared. figures: by name, before and after. causes: which hashes differ."""
 
     drive: str
     method: str
@@ -41,6 +55,8 @@ class DriveChange:
     largest_m: float | None
     rms_m: float | None
     at_s: float | None
+    lat_deg: float | None
+    lon_deg: float | None
     figures: dict[str, tuple[float | None, float | None]]
     causes: tuple[str, ...]
 
@@ -93,33 +109,41 @@ def _compare(
 ) -> DriveChange:
     drive, method = key
     if old is None or new is None:
-        return DriveChange(drive, method, "only in B" if old is None else "only in A", None, None, None, {}, ())
+        return DriveChange(drive, method, "only in B" if old is None else "only in A", *_UNKNOWN, {}, ())
     causes = tuple(name for name in ("inputs", "config", "code") if old[name] != new[name])
     states = old["status"], new["status"]
     if states != ("done", "done"):
         what = {("done", "failed"): "fails now", ("failed", "done"): "works now"}.get(states, "same")
-        return DriveChange(drive, method, what, None, None, None, {}, causes)
-    separation = _separate(
-        *(read_solution_csv(local(folder, f"drives/{drive}/{method}/solution.csv")) for folder in (before, after))
-    )
+        return DriveChange(drive, method, what, *_UNKNOWN, {}, causes)
+    measured = _measure(separate(before, after, drive, method))
     figures = {name: (_known(old[name]), _known(new[name])) for name in FIGURES}
-    same = separation is not None and separation[0] == 0 and all(a == b for a, b in figures.values())
-    return DriveChange(drive, method, "same" if same else "changed", *(separation or (None, None, None)), figures, causes)
+    same = measured[0] == 0 and all(a == b for a, b in figures.values())
+    return DriveChange(drive, method, "same" if same else "changed", *measured, figures, causes)
 
 
 def _known(value: Any) -> float | None:
     return None if value is None or value != value else float(value)
 
 
-def _separate(old: SolutionTable, new: SolutionTable) -> tuple[float, float, float] | None:
-    """Largest and RMS distance [m] at the times that both have, and where it is largest [s]; None without such times."""
-    _, a, b = np.intersect1d(old.t_ns, new.t_ns, return_indices=True)
+def separate(before: Path, after: Path, drive: str, method: str) -> Separation | None:
+    """How far the trajectories of a run are apart at the times that both have; None without such times. Raises LogError."""
+    old, new = (read_solution_csv(local(folder, f"drives/{drive}/{method}/solution.csv")) for folder in (before, after))
+    t_ns, a, b = np.intersect1d(old.t_ns, new.t_ns, return_indices=True)
     if not len(a):
         return None
-    apart: Floats = np.linalg.norm(ned_between(old.lla[a], new.lla[b]), axis=1)
-    worst = int(np.argmax(apart))
-    at = float(old.t_ns[a[worst]] - old.t_ns[0]) / 1e9
-    return float(apart[worst]), float(np.sqrt(np.mean(apart**2))), at
+    lla = old.lla[a]
+    return Separation(t_ns, lla, ned_between(lla, new.lla[b]), ned_between(lla[0], lla))
+
+
+def _measure(apart: Separation | None) -> tuple[float | None, float | None, float | None, float | None, float | None]:
+    """Largest and RMS separation [m], when [s] and where [deg] it is largest."""
+    if apart is None:
+        return _UNKNOWN
+    distance = np.linalg.norm(apart.ned_m, axis=1)
+    worst = int(np.argmax(distance))
+    at_s = float(apart.t_ns[worst] - apart.t_ns[0]) / 1e9
+    lat, lon = np.degrees(apart.lla[worst, :2])
+    return float(distance[worst]), float(np.sqrt(np.mean(distance**2))), at_s, float(lat), float(lon)
 
 
 def _regression(change: DriveChange) -> tuple[int, float, float]:

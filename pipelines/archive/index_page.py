@@ -1,14 +1,17 @@
 """index.html of an archive: every drive and method in a table that sorts and filters without a server, with small tracks."""
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from html import escape
 from importlib.resources import files
 from math import cos, radians
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote
 
+import numpy as np
+
+from navreplay.timeline import Floats
+from pipelines.archive.catalogue import points_of
 from pipelines.archive.manifest import Entry
 from pipelines.files.whole_file import write_whole
 
@@ -33,24 +36,27 @@ _SHOWN = (
     ("outages", "outages"),
     ("findings", "findings"),
 )
-_SIZE = 64
+_WORDS = ("method", "status", "verdict", "note")
+_LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_"
+_PICTURE_POINTS = 24
 _WIDE, _HIGH = 720, 320
 _MOST_TITLES = 2000
 """Drives that the map names and draws as tracks; of more it shows where they begin."""
 
 
 def write_index(folder: Path, entries: Iterable[Entry]) -> None:
-    """The page; rows are data that its script draws as they come into view, so that thousands of them open at once."""
+    """The page; rows are data, apart from the document, and its script makes a row of the table as it comes into view, so that
+    a hundred thousand of them open at once."""
     ordered = sorted(entries, key=lambda one: one.key)
-    rows = [_row(entry) for entry in ordered]
     assets = files("pipelines.archive") / "assets"
     head = "".join(f'<th data-key="{key}">{escape(title)}</th>' for key, title in _SHOWN)
     # a script ends at the first end tag, wherever it stands
-    data = json.dumps(rows, separators=(",", ":")).replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+    data = json.dumps(_columns(ordered), separators=(",", ":"))
+    data = data.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
     page = (
         '<!doctype html><html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
-        f"<title>Archive of {len(rows)} runs</title><style>{(assets / 'index.css').read_text('utf-8')}</style></head><body>"
-        f'<header><h1>Archive of {len(rows)} runs</h1><input id="filter" type="search" placeholder="filter by any word">'
+        f"<title>Archive of {len(ordered)} runs</title><style>{(assets / 'index.css').read_text('utf-8')}</style></head><body>"
+        f'<header><h1>Archive of {len(ordered)} runs</h1><input id="filter" type="search" placeholder="filter by any word">'
         f'<span id="count"></span></header><div id="map">{_map(ordered)}</div>'
         f'<div id="rows"><table><thead><tr><th>track</th>{head}</tr></thead><tbody></tbody></table></div>'
         f'<script type="application/json" id="data">{data}</script>'
@@ -59,45 +65,77 @@ def write_index(folder: Path, entries: Iterable[Entry]) -> None:
     write_whole(folder / NAME, lambda path: path.write_text(page, encoding="utf-8"))
 
 
-def _row(entry: Entry) -> dict[str, Any]:
-    row = {key: entry.row.get(key) for key, _ in _SHOWN}
-    link = f"drives/{quote(entry.drive)}/{quote(entry.method)}/report.html" if entry.status == "done" else ""
-    note = entry.reason or entry.row.get("first_finding", "")
-    own = {"drive": entry.drive, "method": entry.method, "status": entry.status, "note": note, "link": link}
-    return {**row, **own, "track": _path(entry.row.get("track") or [])}
+def _columns(entries: Sequence[Entry]) -> dict[str, Any]:
+    """What the table shows, by column; texts that repeat as numbers into a list of words, so that the page stays small."""
+    own: dict[str, list[Any]] = {
+        "drive": [entry.drive for entry in entries],
+        "method": [entry.method for entry in entries],
+        "status": [entry.status for entry in entries],
+        "note": [entry.reason or entry.row.get("first_finding") or "" for entry in entries],
+    }
+    columns = {key: own.get(key) or [_short(entry.row.get(key)) for entry in entries] for key, _ in _SHOWN}
+    packed: dict[str, Any] = {key: {"values": values} for key, values in columns.items()}
+    for key in _WORDS:
+        words = {word: number for number, word in enumerate(dict.fromkeys(columns[key]))}
+        packed[key] = {"words": list(words), "codes": [words[word] for word in columns[key]]}
+    return {"count": len(entries), "columns": packed, "tracks": [_picture(entry.row.get("track") or "") for entry in entries]}
 
 
-def _path(track: Sequence[Sequence[float]]) -> str:
-    """A track [deg] as the points of a polyline in a square."""
-    if len(track) < 2:
+def _short(value: Any) -> Any:
+    """Four digits, which is what the table shows."""
+    return float(f"{value:.4g}") if isinstance(value, float) else value
+
+
+def _picture(track: str) -> str:
+    """A track thinned, in a square of 64 by 64: two letters a point, east and from the top."""
+    texts = track.split()
+    if len(texts) < 2:
         return ""
-    shrink = cos(radians(track[0][0]))
-    east, north = [lon * shrink for _, lon in track], [-lat for lat, _ in track]
-    span = max(max(east) - min(east), max(north) - min(north)) or 1.0
-    scale = (_SIZE - 8) / span
-    return " ".join(
-        f"{4 + (e - min(east)) * scale:.1f},{4 + (n - min(north)) * scale:.1f}" for e, n in zip(east, north, strict=True)
+    # plain numbers: of so few points arrays would cost more than they save
+    pairs = [text.split(",") for text in texts[:: max(1, len(texts) // _PICTURE_POINTS)]]
+    shrink = cos(radians(float(pairs[0][0])))
+    east, south = [float(lon) * shrink for _, lon in pairs], [-float(lat) for lat, _ in pairs]
+    left, top = min(east), min(south)
+    scale = 55 / (max(max(east) - left, max(south) - top) or 1.0)
+    return "".join(
+        [_LETTERS[int(4 + (e - left) * scale)] + _LETTERS[int(4 + (n - top) * scale)] for e, n in zip(east, south, strict=True)]
     )
 
 
 def _map(entries: Sequence[Entry]) -> str:
-    """All tracks in one picture, north up; a drive that is small in it is a dot."""
+    """All tracks in one picture, north up; a drive that is small in it is a dot, and of very many all are."""
     tracks = {entry.drive: entry.row["track"] for entry in entries if entry.row.get("track")}
-    points = [point for track in tracks.values() for point in track]
-    if not points:
+    if not tracks:
         return ""
-    south, north = min(point[0] for point in points), max(point[0] for point in points)
-    west, east = min(point[1] for point in points), max(point[1] for point in points)
+    if len(tracks) > _MOST_TITLES:
+        drawn = _dots(points_of(" ".join([track.partition(" ")[0] for track in tracks.values()])))
+    else:
+        drawn = _lines({name: points_of(track) for name, track in tracks.items()})
+    label = f"tracks of {len(tracks)} drives, north up"
+    return f'<svg viewBox="0 0 {_WIDE + 12} {_HIGH + 12}" role="img" aria-label="{label}">{drawn}</svg>'
+
+
+def _place(points: Floats) -> Callable[[Floats], Floats]:
+    """From degrees (k, 2) to the picture that holds all points."""
+    (south, west), (north, east) = points.min(axis=0), points.max(axis=0)
     shrink = cos(radians((south + north) / 2))
     span = max((east - west) * shrink / _WIDE, (north - south) / _HIGH) or 1e-9
-    drawn: dict[str, None] = {}
+    return lambda some: np.stack([(some[:, 1] - west) * shrink / span + 6, (north - some[:, 0]) / span + 6], axis=1)
+
+
+def _dots(begins: Floats) -> str:
+    places = np.unique(np.round(_place(begins)(begins)).astype(np.intp), axis=0)
+    return "".join([f'<circle cx="{x}" cy="{y}" r="2.5"></circle>' for x, y in places.tolist()])
+
+
+def _lines(tracks: Mapping[str, Floats]) -> str:
+    place = _place(np.concatenate(list(tracks.values())))
+    drawn = []
     for name, track in tracks.items():
-        place = [((lon - west) * shrink / span + 6, (north - lat) / span + 6) for lat, lon in track]
-        title = f"<title>{escape(name)}</title>" if len(tracks) <= _MOST_TITLES else ""
-        if len(tracks) > _MOST_TITLES or max(abs(x - place[0][0]) + abs(y - place[0][1]) for x, y in place) < 2:
-            drawn[f'<circle cx="{place[0][0]:.0f}" cy="{place[0][1]:.0f}" r="2.5">{title}</circle>'] = None
+        at, title = place(track), f"<title>{escape(name)}</title>"
+        if np.abs(at - at[0]).sum(axis=1).max() < 2:
+            drawn.append(f'<circle cx="{at[0, 0]:.0f}" cy="{at[0, 1]:.0f}" r="2.5">{title}</circle>')
         else:
-            corners = " ".join(f"{x:.1f},{y:.1f}" for x, y in place)
-            drawn[f'<polyline points="{corners}">{title}</polyline>'] = None
-    label = f"tracks of {len(tracks)} drives, north up"
-    return f'<svg viewBox="0 0 {_WIDE + 12} {_HIGH + 12}" role="img" aria-label="{label}">{"".join(drawn)}</svg>'
+            corners = " ".join([f"{x:.1f},{y:.1f}" for x, y in at.tolist()])
+            drawn.append(f'<polyline points="{corners}">{title}</polyline>')
+    return "".join(drawn)

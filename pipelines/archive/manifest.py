@@ -142,4 +142,4 @@ def write_manifest(folder: Path, entries: Iterable[Entry]) -> None:
 
 
 def _line(entry: Entry) -> str:
-    return json.dumps({f.name: getattr(entry, f.name) for f in fields(entry)}, sort_keys=True)
+    return json.dumps({f.name: getattr(entry, f.name) for f in fields(entry)}, sort_keys=True, separators=(",", ":"))

@@ -7,9 +7,11 @@ import rerun as rr
 
 from navreplay.timeline import LogError
 from pipelines.config.spec import Config
+from pipelines.drive.process import read_drive
 from pipelines.drive.result import RunResult
 from pipelines.frames import TabularSolution
-from pipelines.notebook import Result, choose_filter, open_run
+from pipelines.notebook import Result, choose_filter, compare, configure, filter_drive, open_run
+from synthetic_logs import SCENARIOS, simulate, with_duration, write
 from tests.helpers.sample_drive import make_result
 
 
@@ -38,3 +40,17 @@ def test_what_is_not_there_is_one_line(tmp_path) -> None:
         open_run(tmp_path)
     with pytest.raises(LogError, match="did you mean 'huber'"):
         choose_filter(Config(), "hubr")
+
+
+def test_methods_are_compared_in_one_table(tmp_path) -> None:
+    log = simulate(with_duration(SCENARIOS["car-short"], 30.0), 1)
+    write(log, tmp_path / "drive.bag")
+    config = configure(input={"reference": {"file": str(tmp_path / "drive.truth.csv")}})
+    drive = read_drive([tmp_path / "drive.bag"], config)
+    table = compare(drive, config, "fixed", "huber", "mmae")
+    assert list(table.index) == ["fixed", "huber", "mmae"]
+    fixed = filter_drive(drive, choose_filter(config, "fixed"))
+    assert table.loc["fixed", "horizontal_rms_m"] == fixed.evaluation.statistics["all"]["position"]["horizontal"].rms
+    assert (table["reason"] == "").all()
+    with pytest.raises(LogError, match="did you mean 'huber'"):
+        compare(drive, config, "hubr")

@@ -106,3 +106,22 @@ def test_a_built_in_is_not_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert known_methods()["fixed"] is PRESETS["fixed"]
     with pytest.raises(LogError, match="there is no 'halftrust'; did you mean 'half-trust'"):
         build_method("halftrust")
+
+
+def test_a_name_that_is_built_in_counts_and_the_plug_in_is_told_of_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "same_name.py").write_text(
+        "from dataclasses import replace\nfrom half_trust import HALF_TRUST\nfrom steps_format import STEPS\n"
+        "HUBER, MCAP = replace(HALF_TRUST, name='huber'), replace(STEPS, name='mcap')\n"
+    )
+    install(tmp_path, monkeypatch, "[navreplay.filters]\na = same_name:HUBER\n[navreplay.formats]\nb = same_name:MCAP\n")
+    plugins._warn_of_name.cache_clear()
+    for _ in range(2):
+        assert cli.main(["filters"]) == cli.main(["formats"]) == 0
+    assert known_methods()["huber"] is PRESETS["huber"]
+    assert [record.message for record in caplog.records] == [
+        f"warning: a plug-in of 'navreplay.{group}' is named '{name}' as one that is built in, which counts; rename the plug-in"
+        for group, name in (("filters", "huber"), ("formats", "mcap"))
+    ]
+    assert "half" not in capsys.readouterr().out

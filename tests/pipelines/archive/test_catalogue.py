@@ -5,13 +5,14 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
 from navreplay.timeline import LogError
 from pipelines import cli
 from pipelines.archive.catalogue import read_catalogue, select_rows, write_catalogue
-from pipelines.archive.difference import compare_archives
+from pipelines.archive.difference import compare_archives, separate
 from pipelines.archive.index_page import write_index
 from pipelines.archive.manifest import Entry, read_manifest, write_manifest
 from pipelines.archive.sources.drives import ArchiveDrive, find_drives
@@ -67,13 +68,13 @@ def entry(name: str, row: dict | None = None, status: str = "done", reason: str 
 
 def test_hostile_names_stay_text(tmp_path: Path) -> None:
     name = '<script>alert(1)</script>&"</title>'
-    row = {"first_finding": "</script><img src=x onerror=alert(2)>", "track": [[48.0, 11.0], [48.1, 11.1]]}
+    row = {"first_finding": "</script><img src=x onerror=alert(2)>", "track": "48.0,11.0 48.1,11.1"}
     write_index(tmp_path, [entry(name, row)])
     page = (tmp_path / "index.html").read_text()
     assert "<script>alert" not in page
     assert "<img" not in page
     assert page.count("</script>") == 2
-    assert "%3Cscript%3E" in page
+    assert "\\u003cscript\\u003ealert(1)" in page
 
 
 @pytest.mark.parametrize("folder", ["../../etc", "..", "a/../../b", "/abs", ".hidden", "x" * 20 + "\n<b>"])
@@ -92,7 +93,7 @@ def test_no_name_leads_out_of_the_destination(tmp_path: Path, folder: str) -> No
 
 def test_many_rows_go_through(tmp_path: Path) -> None:
     """benchmarks/archive.py does this with 100 000 and tells the seconds."""
-    row = {"horizontal_rms_m": 0.1, "distance_m": 1e3, "track": [[48.0, 11.0], [48.1, 11.1]]}
+    row = {"horizontal_rms_m": 0.1, "distance_m": 1e3, "track": "48.0,11.0 48.1,11.1"}
     entries = [entry(f"d{number // 100:04d}/n{number:06d}", row) for number in range(3000)]
     write_manifest(tmp_path, entries)
     assert list(read_manifest(tmp_path).values()) == entries
@@ -125,6 +126,24 @@ def test_a_difference_names_what_moved_and_is_an_exit_code(
     assert cli.main(["diff", before, after, "--tolerance", "100"]) == 0
     change = compare_archives(*two_batches).changes[0]
     assert 0.1 < change.rms_m < change.largest_m < 20
+
+
+def test_a_difference_is_a_page_with_the_separations_drawn(two_batches: tuple[Path, Path], tmp_path: Path) -> None:
+    before, after = two_batches
+    page = tmp_path / "diff.html"
+    assert cli.main(["diff", str(before), str(after), "--html", str(page)]) == 1
+    text = page.read_text(encoding="utf-8")
+    for drive in ("drive1", "drive2"):
+        assert f"Separation: {drive} (checked)" in text
+    assert text.count('<svg class="plot time"') == 2
+    assert "2 of 2 runs beyond 0.01 m" in text
+    change = compare_archives(before, after).changes[0]
+    assert f"{change.lat_deg:.6f}, {change.lon_deg:.6f}" in text
+    apart = separate(before, after, change.drive, change.method)
+    assert np.linalg.norm(apart.ned_m, axis=1).max() == change.largest_m
+    assert cli.main(["diff", str(before), str(before), "--html", str(page)]) == 0
+    assert "Separation:" not in page.read_text(encoding="utf-8")
+    assert cli.main(["diff", str(before), str(after), "--html", str(tmp_path)]) == 1
 
 
 def test_a_lost_drive_comes_first(two_batches: tuple[Path, Path], tmp_path: Path) -> None:
