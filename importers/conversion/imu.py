@@ -31,9 +31,10 @@ def convert_imu(
             f"it cannot serve as IMU; where another channel holds them, name that one with input.imu.{key}"
         )
     screening = Screening(joined.name, len(joined.t_ns))
-    samples = np.concatenate([rows.gyro, rows.accel], axis=1)
-    screening.reject(~np.isfinite(samples).all(axis=1), "not finite")
-    screening.reject((np.abs(samples) > _BEYOND_ANY_SENSOR).any(axis=1), "beyond any sensor")
+    both = rows.gyro, rows.accel  # apart, since of a long log each copy is much memory
+    screening.reject(~np.logical_and(*(np.isfinite(one).all(axis=1) for one in both)), "not finite")
+    beyond = np.logical_or(*((np.abs(one) > _BEYOND_ANY_SENSOR).any(axis=1) for one in both))
+    screening.reject(beyond, "beyond any sensor")
     order = screening.order(joined.t_ns)
     if len(order) == 0:
         raise LogError(f"{joined.name}: none of its {len(joined.t_ns)} samples is usable: {screening.rejected(slice(None))}")

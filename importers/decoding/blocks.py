@@ -22,6 +22,8 @@ Buffer = NDArray[np.uint8]
 Columns = Mapping[str, np.ndarray]
 _TIMES = "#log_time"
 _MAX_ROOM = 1 << 22
+_WIDE = 4
+"""Numbers of a field from which on it pays to look whether it changes."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -66,12 +68,14 @@ class Decoder(Protocol):
 
 
 class TableBuilder:
-    """Gathers what is decoded of one topic, block by block, in arrays with room for the messages expected."""
+    """Gathers what is decoded of one topic, block by block, in arrays with room for the messages expected. Of wide fields that
+    never change, as covariances mostly are, one row is kept: the column is then a view of it that cannot be written."""
 
     def __init__(self, expected: int) -> None:
         # The expectation comes from the file and may be damaged: it is no reason to reserve any amount of memory.
         self._room = min(max(expected, 1), _MAX_ROOM)
         self._arena: dict[str, np.ndarray] = {}
+        self._steady: dict[str, np.ndarray] = {}
         self._filled = 0
         self._pieces: list[dict[str, np.ndarray]] = []
         self._lengths: list[int] = []
@@ -88,19 +92,29 @@ class TableBuilder:
 
     def _append(self, columns: Columns, count: int) -> None:
         fits = self._filled + count <= len(self._arena.get(_TIMES, ()))
-        if not fits or _shape(columns) != _shape(self._arena):
+        if not fits or _shape(columns) != _shape(self._arena | self._steady):
             self._close_arena()
             self._room = max(self._room, count)
-            self._arena = {path: np.empty((self._room, *column.shape[1:]), column.dtype) for path, column in columns.items()}
+            self._steady = {path: column[:1].copy() for path, column in columns.items() if _may_be_steady(column)}
+            self._arena = {path: self._reserve(column) for path, column in columns.items() if path not in self._steady}
         for path, column in columns.items():
-            self._arena[path][self._filled : self._filled + count] = column
+            if path in self._steady and not _is_all(column, self._steady[path]):
+                self._arena[path] = self._reserve(column)
+                self._arena[path][: self._filled] = self._steady.pop(path)
+            if path in self._arena:
+                self._arena[path][self._filled : self._filled + count] = column
         self._filled += count
+
+    def _reserve(self, like: np.ndarray) -> np.ndarray:
+        return np.empty((self._room, *like.shape[1:]), like.dtype)
 
     def _close_arena(self) -> None:
         if self._arena:
-            self._pieces.append({path: column[: self._filled] for path, column in self._arena.items()})
+            piece = {path: column[: self._filled] for path, column in self._arena.items()}
+            piece |= {path: np.broadcast_to(row, (self._filled, *row.shape[1:])) for path, row in self._steady.items()}
+            self._pieces.append(piece)
             self._lengths.append(self._filled)
-        self._arena, self._filled = {}, 0
+        self._arena, self._steady, self._filled = {}, {}, 0
 
     def lose(self, count: int, reason: str) -> None:
         """Account for messages that cannot be read."""
@@ -114,6 +128,15 @@ class TableBuilder:
         columns = join_columns(self._pieces, self._lengths)
         times = columns.pop(_TIMES, np.empty(0, dtype=np.int64))
         return Table(times, columns, self.read, dict(self._rejected))
+
+
+def _may_be_steady(column: np.ndarray) -> bool:
+    return column.ndim == 2 and column.shape[1] >= _WIDE and column.dtype == np.float64 and len(column) > 0
+
+
+def _is_all(column: np.ndarray, row: np.ndarray) -> bool:
+    """Whether every row has the bits of that one, so that unknown values and signs of zero count as well."""
+    return bool((np.ascontiguousarray(column).view(np.int64) == row.view(np.int64)).all())
 
 
 def _shape(columns: Columns) -> dict[str, tuple[tuple[int, ...], np.dtype]]:
@@ -159,7 +182,11 @@ def _join(columns: list[np.ndarray | None], lengths: list[int]) -> np.ndarray:
         for column, n in zip(columns, lengths, strict=True)
         if n
     ]
-    return filled[0] if len(filled) == 1 else np.concatenate(filled)
+    if len(filled) == 1:
+        return filled[0]
+    if all(column.strides[0] == 0 and _may_be_steady(column) and _is_all(column[:1], filled[0][:1]) for column in filled):
+        return np.broadcast_to(filled[0][:1], (sum(lengths), *shape))
+    return np.concatenate(filled)
 
 
 def _as_objects(column: np.ndarray) -> np.ndarray:

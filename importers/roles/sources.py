@@ -23,6 +23,8 @@ __all__ = ["Clock", "Joined", "Source", "account", "join_sources"]
 _EARLIEST_UNIX_NS = 631_152_000 * 10**9
 _MOST_DELAY_NS = 5e9
 _RESTART_NS = 10**9
+_WITHOUT_ORIENTATION = frozenset({"imu", "accel"})
+"""Roles that an orientation beside the rates serves nothing; of a long log it would be the larger part."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -111,8 +113,11 @@ def _extract(source: Source) -> Rows:
     assert kind is not None
     if len(source.table.log_time_ns) == 0:
         return Rows()
+    columns = source.table.columns
+    if source.role in _WITHOUT_ORIENTATION:
+        columns = {name: column for name, column in columns.items() if not name.startswith("orientation")}
     try:
-        return kind.rows(either_spelling(source.table.columns))
+        return kind.rows(either_spelling(columns))
     except KeyError as error:
         raise LogError(
             f"{source.file}: channel {source.channel.name} says it is {source.channel.type} but has no field {error.args[0]}"

@@ -5,6 +5,7 @@ import math
 import platform
 import re
 from dataclasses import asdict
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
@@ -84,11 +85,18 @@ def outage_errors(result: RunResult) -> tuple[OutageErrors, ...]:
 
 
 def _versions() -> dict[str, str]:
+    return dict(_found_versions())
+
+
+@cache
+def _found_versions() -> tuple[tuple[str, str], ...]:
+    """Looked up once: each costs milliseconds, and an archive has many reports."""
     try:
         own = version("navreplay")
     except PackageNotFoundError:
         own = "not installed (run from a source tree)"
-    return {"navreplay": own, "python": platform.python_version()} | {name: version(name) for name in _DEPENDENCIES}
+    others = ((name, version(name)) for name in _DEPENDENCIES)
+    return (("navreplay", own), ("python", platform.python_version()), *others)
 
 
 def _describe_drive(solution: Solution) -> dict[str, Any]:

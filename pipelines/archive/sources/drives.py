@@ -1,7 +1,7 @@
 """Which files of an archive are one drive, and why."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -83,11 +83,13 @@ def find_drives(files: Sequence[Path], root: Path, book: SeenFiles) -> tuple[lis
     for part in parts:
         by_folder.setdefault(part.path.parent, []).append(part)
     drives: list[ArchiveDrive] = []
-    for folder, inside in sorted(by_folder.items()):
-        drives += _join(folder, inside, [one for one in references if one.parent == folder], root)
+    beside: dict[Path, list[Path]] = {}
     for one in references:
-        if not any(one == drive.reference for drive in drives):
-            others[one] = "a reference that belongs to no drive here"
+        beside.setdefault(one.parent, []).append(one)
+    for folder, inside in sorted(by_folder.items()):
+        drives += _join(folder, inside, beside.get(folder, []), root)
+    used = {drive.reference for drive in drives}
+    others |= {one: "a reference that belongs to no drive here" for one in references if one not in used}
     return _unique(drives), others
 
 
@@ -113,11 +115,14 @@ def _join(folder: Path, parts: Sequence[_Part], references: Sequence[Path], root
     if not groups and len(rest) > 1 and len({part.stem for part in rest}) == len(rest):
         groups, rest = [_Group(folder.name or "drive", rest[:1], "the files of its folder")], rest[1:]
     _join_rest(groups, rest)
+    named: dict[str, list[Path]] = {}
+    for path in references:
+        named.setdefault(_REFERENCE.sub("", path.name.split(".")[0]).rstrip("._-"), []).append(path)
     place = "" if folder == root or root not in folder.parents else f"{folder.relative_to(root)}/"
     return [
         ArchiveDrive(
             *(_safe(place + group.name), tuple(part.path for part in group.parts)),
-            *(_reference_of(group, references, len(groups) == 1), group.why),
+            *(_reference_of(group, named, references if len(groups) == 1 else ()), group.why),
         )
         for group in sorted(groups, key=lambda one: one.name)
     ]
@@ -155,9 +160,10 @@ def _join_names(groups: list[_Group], rest: Sequence[_Part]) -> list[_Part]:
     by_stem: dict[str, list[_Part]] = {}
     for part in rest:
         by_stem.setdefault(part.stem, []).append(part)
+    named = {name: group for group in groups for name in (group.name, *(part.stem for part in group.parts))}
     alone = []
     for stem, same in sorted(by_stem.items()):
-        group = next((one for one in groups if stem in {one.name, *(part.stem for part in one.parts)}), None)
+        group = named.get(stem)
         if group is not None:
             group.parts += same
             group.why += "; files of its name go with it"
@@ -195,12 +201,10 @@ def _of_its_time(groups: Sequence[_Group], part: _Part) -> _Group | None:
     return ordered[0][1]
 
 
-def _reference_of(group: _Group, references: Sequence[Path], only: bool) -> Path | None:
-    names = {group.name, *(part.stem for part in group.parts)}
-    own = [path for path in references if _REFERENCE.sub("", path.name.split(".")[0]).rstrip("._-") in names]
-    if not own and only and len(references) == 1:
-        own = list(references)
-    return own[0] if len(own) == 1 else None
+def _reference_of(group: _Group, named: Mapping[str, list[Path]], only: Sequence[Path]) -> Path | None:
+    """The one reference of its name, or that of its folder. named: references by name. only: of a folder with one drive."""
+    own = {path for name in {group.name, *(part.stem for part in group.parts)} for path in named.get(name, ())} or set(only)
+    return own.pop() if len(own) == 1 else None
 
 
 def _split_number(part: _Part) -> tuple[int, str]:
