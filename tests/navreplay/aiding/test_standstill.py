@@ -61,9 +61,27 @@ def test_standstill_is_found_where_the_car_stands_and_nowhere_else(log):
     t_ns = log.imu.t_ns[::20]
     found = find_standstills(shaken(log), log.timeline().fixes, t_ns).t_ns
     assert speed_at(log, found).max() < 0.05
-    rested = np.array([speed_at(log, np.arange(t - SECOND, t, SECOND // 10)).max() < 1e-3 for t in t_ns])
+    rested = np.array([speed_at(log, np.arange(t - SECOND, t + SECOND, SECOND // 10)).max() < 1e-3 for t in t_ns])
     assert np.isin(t_ns[rested], found).mean() > 0.7
     assert rested.sum() > 100
+
+
+def test_the_first_and_last_moments_of_a_stop_are_left_out(log):
+    """A car that rolls off softly is as quiet as one at rest; it has moved within a second of it."""
+    found = find_standstills(shaken(log, share=0.3), log.timeline().fixes, log.imu.t_ns[::20]).t_ns
+    around = [speed_at(log, found + round(shift * SECOND)).max() for shift in (-0.9, -0.5, 0.5, 0.9)]
+    assert len(found) > 50
+    assert max(around) < 0.05
+
+
+def test_fixes_that_know_motion_refuse_a_standstill(log):
+    """In the middle of a stop that the IMU shows, they tell 5 m/s."""
+    imu, fixes = shaken(log), log.timeline().fixes
+    claimed = find_standstills(imu, fixes, log.imu.t_ns[::20]).t_ns
+    driven = fixes.vel_n + np.where(np.abs(fixes.t_ns - claimed[len(claimed) // 2])[:, None] < 3 * SECOND, 5.0, 0.0)
+    left = find_standstills(imu, replace(fixes, vel_n=driven), log.imu.t_ns[::20]).t_ns
+    assert len(left) > 0
+    assert np.abs(left - claimed[len(claimed) // 2]).min() > 2 * SECOND
 
 
 def test_an_imu_as_quiet_in_motion_as_at_rest_claims_nothing(log):
