@@ -137,9 +137,9 @@ def _windows(values: Floats) -> Floats:
 
 
 def _quietness(imu: ImuSeries, t_ns: Times) -> Floats:
-    """(k, 7) of the second before and that behind each time: the larger standard deviation, over three axes together, of angular
-    rate [rad/s] and of specific force [m/s^2]; the change of the mean of either; the mean angular rate of both seconds. NaN where
-    the IMU does not cover them."""
+    """(k, 7) of the second before and that behind each time: larger standard deviation, over three axes together, of angular
+    rate [rad/s] and of specific force [m/s^2]; change of the mean of either; mean angular rate of both seconds. NaN where the
+    IMU does not cover them."""
     edges = [np.searchsorted(imu.t_ns, t_ns + shift, side="right") for shift in (-_WINDOW_NS, 0, _WINDOW_NS)]
     spreads, changes, means = [], [], []
     for samples in (imu.gyro, imu.accel):

@@ -78,10 +78,9 @@ def test_fixes_that_know_motion_refuse_a_standstill(log):
     """In the middle of a stop that the IMU shows, they tell 5 m/s."""
     imu, fixes = shaken(log), log.timeline().fixes
     claimed = find_standstills(imu, fixes, log.imu.t_ns[::20]).t_ns
-    driven = fixes.vel_n + np.where(np.abs(fixes.t_ns - claimed[len(claimed) // 2])[:, None] < 3 * SECOND, 5.0, 0.0)
+    driven = fixes.vel_n + np.where(np.abs(fixes.t_ns - claimed[len(claimed) // 2])[:, None] < 5 * SECOND, 5.0, 0.0)
     left = find_standstills(imu, replace(fixes, vel_n=driven), log.imu.t_ns[::20]).t_ns
-    assert len(left) > 0
-    assert np.abs(left - claimed[len(claimed) // 2]).min() > 2 * SECOND
+    assert not (np.abs(left - claimed[len(claimed) // 2]) < 2 * SECOND).any()
 
 
 def test_an_imu_as_quiet_in_motion_as_at_rest_claims_nothing(log):
