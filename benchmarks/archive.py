@@ -107,6 +107,13 @@ def tree(folder: Path) -> dict[str, str]:
     }
 
 
+def same_recordings(one: Path, other: Path) -> bool:
+    """By Rerun's own comparison."""
+    rerun = str(Path(sys.executable).parent / "rerun")
+    command = [rerun, "rrd", "compare", "--unordered", str(one), str(other)]
+    return subprocess.run(command, capture_output=True, check=False).returncode == 0
+
+
 @contextlib.contextmanager
 def scheduler(folder: Path, workers: int) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
     """A Dask scheduler on loopback with workers, all processes of their own."""
@@ -151,15 +158,26 @@ def measure_archive(folder: Path, drives: int, scale: float, options: list[str])
         timed("Dask, one of 2 workers killed after 8 s", lambda: batch("dask3", "--scheduler", address))
         killer.wait()
     print(f"Dask: two workers {one / two:.2f} times as fast as one")
-    _kill_three_times(made, folder / "killed", pair, options)
+    _kill_three_times(made, folder / "killed", len(read_manifest(folder / "alone")), pair, options)
     trees = {name: tree(folder / name) for name in ("alone", "pair", "dask1", "dask2", "dask3", "killed")}
     for name, one_tree in trees.items():
         other = {key for key in one_tree | trees["alone"] if one_tree.get(key) != trees["alone"].get(key)}
-        print(f"    {name}: {len(one_tree)} files, {len(other)} other than in process {sorted(other)[:3]}")
+        recordings = sorted(key for key in other if key.endswith(".rrd"))
+        unequal = [key for key in recordings[:20] if not same_recordings(folder / "alone" / key, folder / name / key)]
+        print(
+            f"    {name}: {len(one_tree)} files; {len(recordings)} recordings of other chunks, {len(unequal)} of 20 unequal; "
+            f"{len(other) - len(recordings)} other files differ {sorted(other - {*recordings})[:3]}"
+        )
     print(read_catalogue(folder / "alone").groupby("status").size().to_dict())
 
 
-def _kill_three_times(made: Path, out: Path, lasts_s: float, options: list[str]) -> None:
+def _lines(out: Path) -> int:
+    path = out / "manifest.jsonl"
+    return path.read_bytes().count(b"\n") if path.exists() else 0
+
+
+def _kill_three_times(made: Path, out: Path, entries: int, lasts_s: float, options: list[str]) -> None:
+    """With a fifth, a half and four fifths of the entries done."""
     command = [
         sys.executable,
         "-m",
@@ -174,9 +192,11 @@ def _kill_three_times(made: Path, out: Path, lasts_s: float, options: list[str])
         "--resume",
     ]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    for _ in range(3):
+    for part in (0.2, 0.5, 0.8):
         process = subprocess.Popen([*command, *options], start_new_session=True, env=environment)
-        time.sleep(max(lasts_s / 5, 6.0))
+        begin = time.monotonic()
+        while process.poll() is None and time.monotonic() - begin < 4 * lasts_s and _lines(out) < part * entries:
+            time.sleep(0.05)
         os.killpg(process.pid, signal.SIGKILL)
         process.wait()
         print(f"    killed with {len(read_manifest(out))} entries", flush=True)

@@ -1,5 +1,8 @@
 """What changed between two reprocessings of an archive: drive by drive, and over all drives with paired statistics."""
 
+import tomllib
+from collections import Counter
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -47,7 +50,8 @@ class Separation:
 class DriveChange:
     """One drive by one method. what: ``same``, ``changed``, ``only in A``, ``only in B``, ``fails now``, ``works now``.
     largest_m, rms_m: separation of the trajectories, and at_s, lat_deg, lon_deg: when, from the start, and where it is largest;
-    None where they cannot be compared. figures: by name, before and after. causes: which hashes differ."""
+    None where they cannot be compared. figures: by name, before and after. causes: which hashes differ. settings: keys of the
+    configuration that differ, as ``key: before -> after``."""
 
     drive: str
     method: str
@@ -59,6 +63,7 @@ class DriveChange:
     lon_deg: float | None
     figures: dict[str, tuple[float | None, float | None]]
     causes: tuple[str, ...]
+    settings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,9 +91,15 @@ class Difference:
         lost = ("fails now", "only in A")
         return tuple(one for one in self.changes if one.what in lost or (one.largest_m or 0.0) > tolerance_m)
 
+    @property
+    def settings(self) -> dict[str, int]:
+        """Settings that differ, with the number of runs in which they do, the most frequent first."""
+        return dict(Counter(text for one in self.changes for text in one.settings).most_common())
+
     def plain(self) -> dict[str, Any]:
         """Plain values for JSON."""
-        return {"changes": [asdict(one) for one in self.changes], "figures": [asdict(one) for one in self.figures]}
+        changes, figures = [asdict(one) for one in self.changes], [asdict(one) for one in self.figures]
+        return {"changes": changes, "figures": figures, "settings": self.settings}
 
 
 def compare_archives(before: Path, after: Path) -> Difference:
@@ -118,7 +129,8 @@ def _compare(
     measured = _measure(separate(before, after, drive, method))
     figures = {name: (_known(old[name]), _known(new[name])) for name in FIGURES}
     same = measured[0] == 0 and all(a == b for a, b in figures.values())
-    return DriveChange(drive, method, "same" if same else "changed", *measured, figures, causes)
+    settings = _changed_settings(before, after, drive, method) if "config" in causes else ()
+    return DriveChange(drive, method, "same" if same else "changed", *measured, figures, causes, settings)
 
 
 def _known(value: Any) -> float | None:
@@ -133,6 +145,26 @@ def separate(before: Path, after: Path, drive: str, method: str) -> Separation |
         return None
     lla = old.lla[a]
     return Separation(t_ns, lla, ned_between(lla, new.lla[b]), ned_between(lla[0], lla))
+
+
+def _changed_settings(before: Path, after: Path, drive: str, method: str) -> tuple[str, ...]:
+    old, new = (_flat(_read_toml(local(folder, f"drives/{drive}/{method}/config.toml"))) for folder in (before, after))
+    keys = [key for key in sorted({*old, *new}) if old.get(key) != new.get(key)]
+    return tuple(f"{key}: {old.get(key, 'unset')} -> {new.get(key, 'unset')}" for key in keys)
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise LogError(f"{path}: cannot be read ({error}); process the drive again with --resume") from error
+
+
+def _flat(values: Mapping[str, Any], under: str = "") -> dict[str, Any]:
+    flat: dict[str, Any] = {}
+    for key, value in values.items():
+        flat |= _flat(value, f"{under}{key}.") if isinstance(value, dict) else {f"{under}{key}": value}
+    return flat
 
 
 def _measure(apart: Separation | None) -> tuple[float | None, float | None, float | None, float | None, float | None]:

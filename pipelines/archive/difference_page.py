@@ -31,7 +31,7 @@ def write_difference(path: Path, difference: Difference, before: Path, after: Pa
         f"{before} and {after}",
         _figures(difference, len(changed)),
         plots,
-        (_over_drives(difference), _drive_by_drive(changed)),
+        (_over_drives(difference), *_settings(difference), _drive_by_drive(changed)),
         {"before": str(before), "after": str(after), "tolerance_m": tolerance_m},
         Notice("poor" if beyond else "good", title, lines),
     )
@@ -60,6 +60,11 @@ def _over_drives(difference: Difference) -> Table:
     )
     note = "Paired over the runs that have the figure in both; undecided: the mean is within twice its standard error."
     return Table("Over all runs", ("figure", "runs", "mean change", "standard error", "%", "word"), rows, note)
+
+
+def _settings(difference: Difference) -> tuple[Table, ...]:
+    rows = tuple((text, str(count)) for text, count in difference.settings.items())
+    return (Table("Settings that differ", ("setting: before -> after", "runs"), rows[:_LISTED]),) if rows else ()
 
 
 def _drive_by_drive(changed: Sequence[DriveChange]) -> Table:

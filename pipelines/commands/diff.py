@@ -41,6 +41,8 @@ def _show(difference: Difference, tolerance: float, beyond: int) -> None:
         print(f"{one.drive} ({one.method}): {one.what}{moved}{error}{causes}")
     if len(changed) > _SHOWN:
         print(f"... and {len(changed) - _SHOWN} more")
+    for text, count in list(difference.settings.items())[:_SHOWN]:
+        print(f"{text} ({count} runs)")
     for figure in difference.figures:
         change = f"{figure.mean:+.3g} +- {figure.error:.2g} ({100 * figure.relative:+.1f} %)"
         print(f"{figure.figure:<22}{change:<36}{figure.word} over {figure.drives} drives")

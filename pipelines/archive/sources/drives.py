@@ -143,7 +143,8 @@ def _splits(parts: Sequence[_Part]) -> list[_Group]:
                 chains.append([part])
         for chain in chains:
             if len(chain) == 1:
-                groups.append(_Group(chain[0].stem, chain, "holds IMU and GNSS"))
+                why = "a log that does not open" if "broken" in chain[0].roles else "holds IMU and GNSS"
+                groups.append(_Group(chain[0].stem, chain, why))
             else:
                 groups.append(_Group(name if len(chains) == 1 else chain[0].stem, chain, "splits of one recording"))
     return groups

@@ -5,12 +5,15 @@ from collections.abc import Iterable, Sequence
 from fnmatch import fnmatch
 from pathlib import Path
 
+from importers.containers.file_bytes import storage_suffix
 from navreplay.timeline import LogError
 from pipelines.files.remote import below, is_address
 
 __all__ = ["list_files"]
 
 _LISTS = (".lst", ".list")
+_BAG = "metadata.yaml"
+"""What makes a folder a ROS 2 bag; a storage file without it is a log by itself."""
 
 
 def list_files(sources: Sequence[str], match: str = "*") -> list[Path]:
@@ -60,9 +63,9 @@ def _fetchable(path: Path) -> Iterable[Path]:
         files = [one for one in files if fnmatch(str(one), text)]
     if not files:
         raise LogError(f"{source_text(path)}: nothing is there; name a folder, a log or a pattern")
-    bags = {one.parent for one in files if one.name == "metadata.yaml" or one.suffix == ".db3"}
+    bags = {one.parent for one in files if one.name == _BAG}
     yield from sorted(bags)
-    yield from (one for one in files if one.parent not in bags)
+    yield from (one for one in files if one.parent not in bags or not _of_bag(one))
 
 
 def source_text(path: Path) -> str:
@@ -82,8 +85,12 @@ def _walk(folder: Path) -> Iterable[Path]:
         seen.add(real)
         folders.sort()
         here = Path(root)
-        if (here / "metadata.yaml").exists() or any(name.endswith(".db3") for name in names):
+        if _BAG in names:
             folders.clear()
             yield here
-            continue
-        yield from (here / name for name in sorted(names))
+        yield from (here / name for name in sorted(names) if _BAG not in names or not _of_bag(Path(name)))
+
+
+def _of_bag(path: Path) -> bool:
+    """Whether a file beside a bag's metadata is a part of the bag."""
+    return path.name == _BAG or bool(storage_suffix(path))

@@ -1,5 +1,6 @@
 """What an archive, a destination or a log can have wrong: a line each, and nothing half."""
 
+import json
 import os
 import subprocess
 import sys
@@ -194,3 +195,17 @@ def test_a_fault_of_ours_costs_its_drive_and_is_kept_in_the_log(archive: Path, m
     assert "the program is at fault (ZeroDivisionError)" in reasons(archive)["drive"]
     (log,) = (archive.parent / "out" / "log").iterdir()
     assert "a bug" in log.read_text()
+
+
+def test_since_until_and_match_choose_files(archive: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write(simulate(with_duration(SCENARIOS["car-short"], 20.0), 2), archive / "old.bag")
+    os.utime(archive / "old.bag", ns=(0, 10**18))  # 2001
+    for options, names in (
+        (["--until", "2010-01-01"], {"old"}),
+        (["--since", "2010-01-01T00:00:00+00:00"], {"drive"}),
+        (["--match", "*.mcap"], {"drive"}),
+    ):
+        assert batch(archive, "--dry-run", "--json", *options) == 0
+        assert {one["drive"] for one in json.loads(capsys.readouterr().out)["drives"]} == names
+    assert batch(archive, "--match", "*.mcap", "--until", "2010-01-01") == 1
+    assert "holds no files that match --match, --since and --until" in capsys.readouterr().err

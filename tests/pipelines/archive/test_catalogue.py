@@ -139,6 +139,8 @@ def test_a_difference_is_a_page_with_the_separations_drawn(two_batches: tuple[Pa
     assert "2 of 2 runs beyond 0.01 m" in text
     change = compare_archives(before, after).changes[0]
     assert f"{change.lat_deg:.6f}, {change.lon_deg:.6f}" in text
+    assert change.settings == ("input.fix.lever_arm_m: [0.0, 0.0, 0.0] -> [3.0, 0.0, 0.0]",)
+    assert "input.fix.lever_arm_m: [0.0, 0.0, 0.0] -&gt; [3.0, 0.0, 0.0]" in text
     apart = separate(before, after, change.drive, change.method)
     assert np.linalg.norm(apart.ned_m, axis=1).max() == change.largest_m
     assert cli.main(["diff", str(before), str(before), "--html", str(page)]) == 0

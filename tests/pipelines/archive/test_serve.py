@@ -1,5 +1,7 @@
 """The archive in Rerun, asked by the catalogue's own client."""
 
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -68,6 +70,21 @@ def test_a_query_over_all_drives_finds_the_nees_at_the_end_of_long_outages(datas
 def test_methods_do_not_mix_in_a_segment(dataset: Any) -> None:
     tracks = {column.entity_path for column in dataset.schema().component_columns() if column.entity_path.endswith("/solution")}
     assert tracks == {f"/{method}/{view}/solution" for method in METHODS for view in ("local", "map")}
+
+
+def test_recordings_made_again_are_equal(archive: Path) -> None:
+    again = archive.parent / "again"
+    command = ["batch", str(archive.parent / "in"), "-o", str(again), "--quiet", "--workers", "1", "--match", "*drive.bag"]
+    config = archive / "drives/day1/drive/checked/config.toml"
+    assert cli.main([*command, "-c", str(config)]) == 0
+    recordings = [str(folder / "drives/day1/drive/checked/recording.rrd") for folder in (archive, again)]
+    rerun = str(Path(sys.executable).parent / "rerun")
+    compare = subprocess.run([rerun, "rrd", "compare", "--unordered", *recordings], capture_output=True, text=True, check=False)
+    assert compare.returncode == 0, compare.stderr
+    other = str(archive / "drives/day2/drive/checked/recording.rrd")
+    assert subprocess.run(
+        [rerun, "rrd", "compare", "--unordered", recordings[0], other], capture_output=True, check=False
+    ).returncode
 
 
 def test_what_cannot_be_served_is_one_line(archive: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -106,3 +106,16 @@ def test_the_files_of_a_folder_with_names_of_their_own_are_one_drive(logs: Path,
     shutil.copy(logs / "one.fix.csv", tmp_path / "ublox.fix.csv")
     (drive,) = find(tmp_path).values()
     assert names(drive) == ["ublox.fix.csv", "xsens.imu.csv"]
+
+
+def test_a_folder_is_a_bag_by_its_metadata_and_a_storage_file_alone_is_a_log(tmp_path: Path) -> None:
+    for seed, name in ((1, "day/a.db3"), (2, "day/b.mcap"), (3, "day/c"), (4, "day/d.bag")):
+        write(simulate(with_duration(SCENARIOS["car-short"], 20.0), seed), tmp_path / name)
+    found = find(tmp_path)
+    assert {name: names(drive) for name, drive in found.items()} == {
+        "day/a": ["a.db3"],
+        "day/b": ["b.mcap"],
+        "day/c": ["c"],
+        "day/d": ["d.bag"],
+    }
+    assert all(drive.reference is not None for drive in found.values())
