@@ -192,7 +192,8 @@ class ConsiderOptions:
     In the measurements: position_bias [m] and velocity_bias [m/s], as if the antenna were displaced by one and drifted with the
     other, of fixes as of ranges (along each line of sight); zenith_delay [m] of pseudoranges, divided by the sine of the
     elevation. In the dynamics: position_rate [m/s] and velocity_rate [m/s^2] add to the derivatives of position and velocity.
-    every_method: reckon with them in every method, not in those alone that are made for it.
+    every_method: reckon with them in every method, not in those alone that are made for it; "ranges": where ranges aid the
+    filter, in every method that can.
     """
 
     position_bias: tuple[float, float, float] = (1.0, 1.0, 2.0)
@@ -200,7 +201,7 @@ class ConsiderOptions:
     zenith_delay: float = 0.0
     position_rate: tuple[float, float, float] = (0.0, 0.0, 0.0)
     velocity_rate: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    every_method: bool = False
+    every_method: bool | Literal["ranges"] = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,7 @@ import numpy as np
 
 from navreplay.adapt.inflation.partial_tracking import PartialTracking
 from navreplay.aiding.epochs import Aiding, Observed
+from navreplay.error_models.clocked import ClockedModel
 from navreplay.error_models.considered import ConsideredModel
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.error_models.ned import Propagated
@@ -150,7 +151,7 @@ class Setup(NamedTuple):
 
 def check_considers(method: Method, options: FilterOptions) -> None:
     """Raises LogError where consider parameters are asked for and cannot be combined with the method or with smoothing."""
-    if not (method.considers or options.consider.every_method):
+    if not (method.considers or options.consider.every_method is True):
         return
     mend = "take a method without consider parameters" if method.considers else "consider.every_method = false"
     if options.smooth:
@@ -158,17 +159,24 @@ def check_considers(method: Method, options: FilterOptions) -> None:
             f"filter: '{method.name}' considers biases that it does not estimate, and such a solution cannot be smoothed; set "
             f"filter.smooth = false, or {mend}"
         )
-    if not isinstance(method.rule, Linearised) or method.weighting is not None:
+    if not _can_consider(method, options):
         raise LogError(
             f"filter: consider parameters need a single linearised filter, which '{method.name}' is not; set "
             "consider.every_method = false, or take 'eckf'"
         )
 
 
+def _can_consider(method: Method, options: FilterOptions) -> bool:
+    return isinstance(method.rule, Linearised) and method.weighting is None and not options.smooth
+
+
 def set_up(aiding: Aiding, model: ErrorModel, method: Method, options: FilterOptions) -> Setup:
     """What to run a method with on aiding and its error model; with consider parameters where method or options have them,
     as `check_considers` allows."""
-    if not (method.considers or options.consider.every_method):
+    asked = options.consider.every_method
+    if asked == "ranges":
+        asked = isinstance(model, ClockedModel) and _can_consider(method, options)
+    if not (method.considers or asked):
         return Setup(aiding, model, method)
     assert isinstance(method.rule, Linearised)  # as `check_considers` holds
     considered = ConsideredModel.of(model, options.consider)

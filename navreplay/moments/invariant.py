@@ -7,12 +7,13 @@ large the error of that is. To first order xi, in NED axes, is this program's er
 of the linearised filter. What differs is the step behind the gain: the correction is applied by the exponential of SE2(3), so
 velocity and position are moved by the left Jacobian J of SO(3) at the correction phi of the attitude,
     q <- exp(phi) q,   v <- v + J(phi) dv,   p <- p + J(phi) dp,
-and the covariance, which is attached to the body, turns with it by exp(phi). Below half a degree neither is worth its time.
+and the covariance, which is attached to the body, turns with it by exp(phi). That is left out where the attitude is known to ten
+degrees and corrected by less than two.
 The right-invariant error, whose exponential turns velocity and position about the origin of the axes, was tried: fixes seen
 from far off that origin spoil it (docs/methods/iekf.md).
 Assumes: the first nine states are position, velocity and rotation vector in NED.
 Fails: where the linearised filter does for other reasons than a large error of attitude.
-When well specified: `fixed`, but for terms of second order in corrections of the attitude of more than half a degree.
+When well specified: `fixed`, but for terms of second order where the attitude is not known to ten degrees, or corrected by two.
 """
 
 from dataclasses import dataclass
@@ -27,7 +28,8 @@ from navreplay.update.gaussian import Gaussian, symmetric
 
 __all__ = ["Invariant", "left_jacobian"]
 
-_NEGLIGIBLE = np.radians(0.5)
+_KNOWN, _SMALL = np.radians(10.0), np.radians(2.0)
+"""Standard deviation of the attitude, all axes together, and its correction, below which terms of second order are nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +39,8 @@ class Invariant(Linearised):
     def settle(self, posterior: Gaussian) -> Gaussian:
         """The posterior (n,), (n, n) as `ErrorModel.retract` takes it, about the state that it moves to."""
         phi = posterior.mean[ATTITUDE]
-        if phi @ phi < _NEGLIGIBLE**2:
+        left = posterior.cov[ATTITUDE, ATTITUDE].trace()
+        if (phi @ phi < _SMALL**2 and left < _KNOWN**2) or not phi.any():
             return posterior
         mean, turn = posterior.mean.copy(), np.eye(len(posterior.mean))
         jacobian, rotation = left_jacobian(phi), matrix_from_quat(quat_from_rotvec(phi))

@@ -210,7 +210,11 @@ class ConsiderSection(Section):
     velocity_rate_std_mps2: Stds = Field(
         (0.0, 0.0, 0.0), description="added to the derivative of the velocity: [north, east, down] [m/s^2]"
     )
-    every_method: bool = Field(False, description="reckon with them in every method, not in eckf and psteckf alone")
+    every_method: bool | Literal["ranges"] = Field(
+        "ranges",
+        description="true: reckon with them in every method, false: in eckf and psteckf alone; 'ranges': where ranges aid the "
+        "filter, in every method that can",
+    )
 
     def options(self) -> ConsiderOptions:
         """The same for the filter."""

@@ -30,7 +30,7 @@ def test_the_exponential_is_that_of_the_group(phi: list[float]) -> None:
 
 def test_small_corrections_are_those_of_the_linearised_filter() -> None:
     rng = np.random.default_rng(1)
-    root = rng.standard_normal((15, 15))
+    root = 0.02 * rng.standard_normal((15, 15))
     posterior = Gaussian(np.concatenate([rng.standard_normal(6), [1e-3, -2e-3, 3e-3], np.zeros(6)]), root @ root.T)
     assert Invariant().settle(posterior) is posterior
 

@@ -7,7 +7,7 @@ import tomllib
 
 import pytest
 
-from navreplay.options import GRADES, FilterOptions
+from navreplay.options import GRADES, ConsiderOptions, FilterOptions
 from navreplay.timeline import LogError
 from pipelines.config.spec import Config, apply_sets, config_keys, dump_toml, filter_options, load_config, validate
 from pipelines.config.template import commented_template
@@ -28,7 +28,8 @@ def error_of(path, *sets):
 
 
 def test_defaults_are_those_of_the_filter():
-    assert filter_options(Config()) == FilterOptions()
+    """But for biases of ranges: a log from the field has them, one of an experiment those that it is given."""
+    assert filter_options(Config()) == FilterOptions(consider=ConsiderOptions(every_method="ranges"))
 
 
 def test_figures_of_a_data_sheet_win_over_the_grade_and_are_converted():
