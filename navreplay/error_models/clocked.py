@@ -69,7 +69,7 @@ class ClockedModel:
     def retract(self, state: NavState, correction: Floats) -> NavState:
         """The state moved by an estimated error (n + c,), true minus computed."""
         n = self.motion.size
-        return replace(self.motion.retract(state, correction[:n]), clock=state.clock + correction[n:])
+        return replace(self.motion.retract(state, correction[..., :n]), clock=state.clock + correction[..., n:])
 
     def difference(self, true: NavState, computed: NavState) -> Floats:
         """(n + c,) the error by which `retract` takes computed to true."""

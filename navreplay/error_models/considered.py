@@ -76,7 +76,7 @@ class ConsideredModel:
 
     def retract(self, state: NavState, correction: Floats) -> NavState:
         """The state moved by an estimated error (n + p,), true minus computed, of which biases get nothing."""
-        return self.inner.retract(state, correction[: self.inner.size])
+        return self.inner.retract(state, correction[..., : self.inner.size])
 
     def difference(self, true: NavState, computed: NavState) -> Floats:
         """(n + p,) the error by which `retract` takes computed to true; of the biases, which are not estimated, zero."""

@@ -28,7 +28,7 @@ class ErrorModel(Protocol):
         ...
 
     def retract(self, state: NavState, correction: Floats) -> NavState:
-        """The state moved by an estimated error (n,), true minus computed."""
+        """The state moved by an estimated error (n,), true minus computed; or k states, stacked, by errors (k, n)."""
         ...
 
     def difference(self, true: NavState, computed: NavState) -> Floats:

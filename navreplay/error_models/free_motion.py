@@ -60,11 +60,11 @@ class FreeMotionModel:
 
     def retract(self, state: NavState, correction: Floats) -> NavState:
         """The state moved by an estimated error (n,), true minus computed."""
-        acceleration = state.acceleration + correction[ACCELERATION] if self.size > 9 else state.acceleration
+        acceleration = state.acceleration + correction[..., ACCELERATION] if self.size > 9 else state.acceleration
         moved = replace(
             state,
-            lla=earth.move_lla(state.lla, correction[POSITION]),
-            vel_n=state.vel_n + correction[VELOCITY],
+            lla=earth.move_lla(state.lla, correction[..., POSITION]),
+            vel_n=state.vel_n + correction[..., VELOCITY],
             acceleration=acceleration,
         )
         return self._face_course(moved)
@@ -122,9 +122,10 @@ class FreeMotionModel:
 
     def _face_course(self, state: NavState) -> NavState:
         """Yaw from the course; kept where the vehicle hardly moves."""
-        if np.hypot(state.vel_n[0], state.vel_n[1]) < _LEAST_SPEED:
-            return state
-        return replace(state, q_nb=rotation.quat_from_euler(0.0, 0.0, float(np.arctan2(state.vel_n[1], state.vel_n[0]))))
+        north, east = state.vel_n[..., 0], state.vel_n[..., 1]
+        level = np.zeros_like(north)
+        faced = rotation.quat_from_euler(level, level, np.arctan2(east, north))
+        return replace(state, q_nb=np.where((np.hypot(north, east) < _LEAST_SPEED)[..., None], state.q_nb, faced))
 
     def _doubt_attitude(self, state: NavState, cov: Floats) -> None:
         """Sets the covariance of the attitude in cov (n, n)."""

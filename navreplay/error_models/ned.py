@@ -132,20 +132,22 @@ class NedErrorModel:
         return tied
 
     def retract(self, state: NavState, correction: Floats) -> NavState:
-        """The state moved by an estimated error (n,), true minus computed."""
-        scales = correction[15:21] if self.has_scale else np.zeros(6)
-        markov = correction[self.size - 3 : self.size] if self.has_markov else np.zeros(3)
-        turn = rotation.quat_from_rotvec(correction[ATTITUDE])
+        """The state moved by an estimated error (n,), true minus computed; or k states by errors (k, n)."""
+        scales = correction[..., 15:21] if self.has_scale else np.zeros(6)
+        markov = correction[..., self.size - 3 : self.size] if self.has_markov else np.zeros(3)
+        turn = rotation.quat_from_rotvec(correction[..., ATTITUDE])
         q_nb = rotation.quat_multiply(turn, state.q_nb)
         return NavState(
-            earth.move_lla(state.lla, correction[POSITION]),
-            state.vel_n + correction[VELOCITY],
-            q_nb / np.linalg.norm(q_nb),
-            state.gyro_bias + correction[GYRO_BIAS],
-            state.accel_bias + correction[ACCEL_BIAS],
-            state.gyro_scale + scales[:3],
-            state.accel_scale + scales[3:],
+            earth.move_lla(state.lla, correction[..., POSITION]),
+            state.vel_n + correction[..., VELOCITY],
+            q_nb / np.linalg.norm(q_nb, axis=-1, keepdims=True),
+            state.gyro_bias + correction[..., GYRO_BIAS],
+            state.accel_bias + correction[..., ACCEL_BIAS],
+            state.gyro_scale + scales[..., :3],
+            state.accel_scale + scales[..., 3:],
             state.gyro_markov + markov,
+            np.zeros_like(state.vel_n),
+            state.clock,
         )
 
     def difference(self, true: NavState, computed: NavState) -> Floats:

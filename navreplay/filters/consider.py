@@ -150,24 +150,18 @@ class Setup(NamedTuple):
 
 
 def check_considers(method: Method, options: FilterOptions) -> None:
-    """Raises LogError where consider parameters are asked for and cannot be combined with the method or with smoothing."""
+    """Raises LogError where consider parameters are asked for and cannot be combined with the method."""
     if not (method.considers or options.consider.every_method is True):
         return
-    mend = "take a method without consider parameters" if method.considers else "consider.every_method = false"
-    if options.smooth:
-        raise LogError(
-            f"filter: '{method.name}' considers biases that it does not estimate, and such a solution cannot be smoothed; set "
-            f"filter.smooth = false, or {mend}"
-        )
-    if not _can_consider(method, options):
+    if not _can_consider(method):
         raise LogError(
             f"filter: consider parameters need a single linearised filter, which '{method.name}' is not; set "
             "consider.every_method = false, or take 'eckf'"
         )
 
 
-def _can_consider(method: Method, options: FilterOptions) -> bool:
-    return isinstance(method.rule, Linearised) and method.weighting is None and not options.smooth
+def _can_consider(method: Method) -> bool:
+    return isinstance(method.rule, Linearised) and method.weighting is None
 
 
 def set_up(aiding: Aiding, model: ErrorModel, method: Method, options: FilterOptions) -> Setup:
@@ -175,7 +169,7 @@ def set_up(aiding: Aiding, model: ErrorModel, method: Method, options: FilterOpt
     as `check_considers` allows."""
     asked = options.consider.every_method
     if asked == "ranges":
-        asked = isinstance(model, ClockedModel) and _can_consider(method, options)
+        asked = isinstance(model, ClockedModel) and _can_consider(method)
     if not (method.considers or asked):
         return Setup(aiding, model, method)
     assert isinstance(method.rule, Linearised)  # as `check_considers` holds

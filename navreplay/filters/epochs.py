@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from navreplay.error_models.considered import ConsideredModel
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.filters.rows import Rows
 from navreplay.filters.update import Estimator
@@ -51,7 +52,8 @@ def run_epochs(
             if updated.lost:
                 rows = rows.until(node)
                 break
-    return rows.smoothed(model) if options.smooth else rows
+    considered = len(model.kept) if isinstance(model, ConsideredModel) else 0
+    return rows.smoothed(model, considered) if options.smooth else rows
 
 
 def output_times(start_ns: int, end_ns: int, rate: float) -> Times:

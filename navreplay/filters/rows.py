@@ -1,6 +1,6 @@
 """Rows of a solution while it grows, one per node, and what a smoother needs of them."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.special import chdtri
@@ -23,14 +23,14 @@ _LEAST_GAIN = 0.05
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Rows:
-    """t_ns: (k,). states: (k, w) packed. covariances: (k, n, n). status: (k,) of RowStatus. forward: what a smoother needs.
-    agreement: (k,) of smoothed rows, see `backward_agreement`."""
+    """t_ns: (k,). states: (k, w) packed. covariances: (k, n, n). status: (k,) of RowStatus. needs: of a smoother, where one
+    follows. agreement: (k,) of smoothed rows, see `backward_agreement`."""
 
     t_ns: Times
     states: Floats
     covariances: Floats
     status: np.ndarray
-    forward: ForwardPass | None
+    needs: "_Needs | None"
     agreement: Floats | None = None
 
     @classmethod
@@ -41,47 +41,62 @@ class Rows:
         states[0], covariances[0] = first, cov
         status = np.full(k, RowStatus.PREDICTED, dtype=np.int8)
         status[0] = RowStatus.UPDATED
-        if not keep:
-            return cls(t_ns, states, covariances, status, None)
-        needs = np.empty_like(states), np.empty_like(covariances), np.empty_like(covariances)
-        return cls(t_ns, states, covariances, status, ForwardPass(states, covariances, *needs))
+        return cls(t_ns, states, covariances, status, _Needs(np.empty_like(covariances)) if keep else None)
 
     def put(self, rows: slice, moved: Propagated) -> None:
         """Writes propagated nodes."""
         self.states[rows], self.covariances[rows] = moved.states, moved.covariances
-        if self.forward is not None:
-            self.forward.prior_states[rows], self.forward.prior_covariances[rows] = moved.states, moved.covariances
-            self.forward.transitions[rows] = moved.transitions
+        if self.needs is not None:
+            self.needs.transitions[rows] = moved.transitions
 
     def correct(self, row: int, updated: Updated) -> None:
         """Writes a measurement epoch over its propagated node."""
         self.states[row], self.covariances[row], self.status[row] = updated.state.pack(), updated.cov, updated.status
-        if self.forward is not None:
-            self.forward.prior_states[row] = updated.prior_state.pack()
-            self.forward.prior_covariances[row] = updated.prior_cov
+        if self.needs is not None:
+            self.needs.corrected.append(row)
+            self.needs.prior_states.append(updated.prior_state.pack())
+            self.needs.prior_covariances.append(updated.prior_cov)
 
     def until(self, row: int) -> "Rows":
         """The rows up to that one."""
         kept = slice(0, row + 1)
-        forward = None if self.forward is None else ForwardPass(*(part[kept] for part in self.forward))
-        return Rows(self.t_ns[kept], self.states[kept], self.covariances[kept], self.status[kept], forward)
+        needs = None if self.needs is None else replace(self.needs, transitions=self.needs.transitions[kept])
+        return Rows(self.t_ns[kept], self.states[kept], self.covariances[kept], self.status[kept], needs)
 
-    def smoothed(self, model: ErrorModel) -> "Rows":
-        """The rows given all measurements; the smoother's needs are dropped. Rows stay as they are where none were kept."""
-        if self.forward is None:
+    def smoothed(self, model: ErrorModel, considered: int) -> "Rows":
+        """The rows given all measurements; the smoother's needs are dropped. Rows stay as they are where none were kept. The
+        last `considered` error states are biases that are not estimated."""
+        if self.needs is None:
             return self
-        states, covariances = smooth(self.forward, model)
+        told = self.covariances[:, :2, :2].copy()
+        states = smooth(self.needs.forward_pass(self.states, self.covariances), model, considered)
         status = np.full_like(self.status, RowStatus.SMOOTHED)
-        agreement = _agreement(self, states, covariances)
-        return replace(self, states=states, covariances=covariances, status=status, forward=None, agreement=agreement)
+        agreement = _agreement(self.states, told, states, self.covariances[:, :2, :2])
+        return replace(self, states=states, status=status, needs=None, agreement=agreement)
 
 
-def _agreement(forward: Rows, states: Floats, covariances: Floats) -> Floats:
-    """(k,) normalised squares of the horizontal differences between forward and smoothed rows, whose covariance is the
-    difference of theirs; NaN where the smoother had hardly anything to add (Rauch et al., AIAA Journal 3 (1965) 1445)."""
-    moved = ned_between(forward.states[:, :3], states[:, :3])[:, :2]
-    told = forward.covariances[:, :2, :2]
-    gained = told - covariances[:, :2, :2]
+@dataclass(frozen=True, eq=False, slots=True)
+class _Needs:
+    """transitions (k, n, n), and of each corrected row its index, packed state and covariance before."""
+
+    transitions: Floats
+    corrected: list[int] = field(default_factory=list)
+    prior_states: list[Floats] = field(default_factory=list)
+    prior_covariances: list[Floats] = field(default_factory=list)
+
+    def forward_pass(self, states: Floats, covariances: Floats) -> ForwardPass:
+        """With the rows as they were filtered."""
+        n = covariances.shape[1]
+        priors = np.reshape(self.prior_states, (-1, states.shape[1])), np.reshape(self.prior_covariances, (-1, n, n))
+        return ForwardPass(states, covariances, self.transitions, np.array(self.corrected, dtype=np.intp), *priors)
+
+
+def _agreement(filtered: Floats, told: Floats, smoothed: Floats, left: Floats) -> Floats:
+    """(k,) normalised squares of the horizontal differences between filtered and smoothed states (k, w), whose covariance is
+    the difference of theirs, told and left (k, 2, 2); NaN where the smoother had hardly anything to add (Rauch et al., AIAA
+    Journal 3 (1965) 1445)."""
+    moved = ned_between(filtered[:, :3], smoothed[:, :3])[:, :2]
+    gained = told - left
     squares = normalised_squares(moved, gained)
     least = np.linalg.eigvalsh(gained)[:, 0] / np.trace(told, axis1=1, axis2=2)
     return np.where(least > _LEAST_GAIN, squares, np.nan)

@@ -116,14 +116,15 @@ class NavState:
         return cls(lla, vel_n, q_nb, np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3))
 
     def pack(self) -> Floats:
-        """(28 + c,) the layout of the kernels, and what they carry along behind it."""
+        """(28 + c,) the layout of the kernels, and what they carry along behind it; (k, 28 + c) of k states."""
         sensors = [self.gyro_bias, self.accel_bias, self.gyro_scale, self.accel_scale, self.gyro_markov]
-        return np.concatenate([self.lla, self.vel_n, self.q_nb, *sensors, self.acceleration, self.clock])
+        return np.concatenate([self.lla, self.vel_n, self.q_nb, *sensors, self.acceleration, self.clock], axis=-1)
 
     @classmethod
     def unpack(cls, x: Floats) -> "NavState":
-        """The inverse of `pack`; x (28 + c,)."""
-        return cls(x[0:3], x[3:6], x[6:10], x[10:13], x[13:16], x[16:19], x[19:22], x[22:25], x[25:28], x[28:])
+        """The inverse of `pack`; x (28 + c,) of one state, (k, 28 + c) of k at once, whose parts are then (k, ...)."""
+        ends = (0, 3, 6, 10, 13, 16, 19, 22, 25, 28, x.shape[-1])
+        return cls(*(x[..., first:end] for first, end in pairwise(ends)))
 
     @property
     def gyro_error(self) -> Floats:

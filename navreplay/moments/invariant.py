@@ -7,8 +7,8 @@ large the error of that is. To first order xi, in NED axes, is this program's er
 of the linearised filter. What differs is the step behind the gain: the correction is applied by the exponential of SE2(3), so
 velocity and position are moved by the left Jacobian J of SO(3) at the correction phi of the attitude,
     q <- exp(phi) q,   v <- v + J(phi) dv,   p <- p + J(phi) dp,
-and the covariance, which is attached to the body, turns with it by exp(phi). That is left out where the attitude is known to ten
-degrees and corrected by less than two.
+and the covariance, which is attached to the body, turns with it by exp(phi). That is left out where the attitude is known to
+ten degrees and corrected by less than two.
 The right-invariant error, whose exponential turns velocity and position about the origin of the axes, was tried: fixes seen
 from far off that origin spoil it (docs/methods/iekf.md).
 Assumes: the first nine states are position, velocity and rotation vector in NED.

@@ -288,17 +288,33 @@ def test_tightly_coupled_with_and_without_imu(ranges, name):
         assert (solution.std[-1, :2] > 0.9).all()
 
 
-def test_smoothing_is_refused(log):
-    with pytest.raises(LogError, match=r"'eckf' considers biases .* cannot be smoothed; set filter.smooth = false"):
-        run_filter(log.timeline(), build_method("eckf"), options(smooth=True))
+def test_smoothed_errors_are_as_large_as_told_where_biases_are_considered() -> None:
+    """Biases of 2, 2 and 4 m that stay: no smoother takes them away, and its covariance says so."""
+    scenario = synthetic_logs.with_duration(synthetic_logs.SCENARIOS["uav-biased-fixes"], 120.0)
+    gnss = replace(scenario.gnss, position_bias_std=(2.0, 2.0, 4.0), velocity_bias_std=(0.0, 0.0, 0.0))
+    biases = replace(NOTHING, position_bias=(2.0, 2.0, 4.0))
+    nees, std = [], []
+    for seed in range(1, 13):
+        drawn = synthetic_logs.simulate(replace(scenario, gnss=gnss), seed)
+        chosen = FilterOptions(imu_noise=drawn.scenario.imu.noise, output_rate=1.0, smooth=True, consider=biases)
+        solution = run_filter(drawn.timeline(), build_method("eckf"), chosen)
+        nees.append(evaluate(solution, drawn.truth).nees["position"].mean)
+        std.append(solution.std[:, 2].min())
+    # three biases a seed: the sum over the seeds is chi-square of 36, and what is white comes on top
+    assert 36 * 0.4 < np.sum(nees) < 36 * 1.8
+    assert min(std) > 3.9
 
 
-def test_smoothing_is_refused_before_a_calibration_and_names_what_to_change(log):
-    chosen = options(smooth=True, consider=replace(ALL_BIASES, every_method=True))
-    begun: list[float] = []
-    with pytest.raises(LogError, match=r"set filter.smooth = false, or consider.every_method = false"):
-        run_filter(log.timeline(), build_method("auto"), chosen, begun.append)
-    assert begun == []
+def test_a_considered_bias_of_nothing_smooths_like_none(log) -> None:
+    biases = replace(NOTHING, position_bias=(1e-6,) * 3, every_method=True)
+    with_biases, without = (
+        run_filter(log.timeline(), build_method("fixed"), options(smooth=True, consider=chosen))
+        for chosen in (biases, replace(NOTHING, every_method=False))
+    )
+    n = without.cov.shape[1]
+    np.testing.assert_allclose(with_biases.lla, without.lla, rtol=0, atol=1e-13)
+    scale = without.std[:, :, None] * without.std[:, None, :]
+    np.testing.assert_allclose(with_biases.cov[:, :n, :n] / scale, without.cov / scale, atol=1e-6)
 
 
 def test_a_bank_is_refused(log):
