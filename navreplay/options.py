@@ -113,8 +113,9 @@ class RangeOptions:
     """Pseudoranges, range rates, and the receiver clock.
 
     Where the receiver reports no standard deviation that is positive, a measurement's is pseudorange_std [m] or range_rate_std
-    [m/s], those of a strong signal from the zenith, times sqrt(1 + 10^((cn0_reference - C/N0) / 10)) / sin(elevation): its
-    variance doubles at cn0_reference [dB-Hz] (SIGMA-epsilon model, Hartinger and Brunner, GPS Solutions 2(4) (1999) 35).
+    [m/s], those of a strong signal from the zenith, times sqrt(1 + 10^((cn0_reference - C/N0) / 10)), by which its variance
+    doubles at cn0_reference [dB-Hz] (SIGMA-epsilon model, Hartinger and Brunner, GPS Solutions 2(4) (1999) 35), over the sine
+    of the elevation for pseudoranges, whose errors of the atmosphere grow so, and over its root for range rates.
     pseudorange_std_floor, range_rate_std_floor: least ones believed.
     Not used: satellites below elevation_mask [rad] and signals below cn0_mask [dB-Hz]. ionosphere, troposphere: correct for
     them what is not yet corrected. clock_noise [m/sqrt(s)] and clock_drift_walk [m/s/sqrt(s)]: white noise of the receiver
@@ -129,7 +130,7 @@ class RangeOptions:
     range_rate_std: float = 0.05
     pseudorange_std_floor: float = 0.3
     range_rate_std_floor: float = 0.01
-    cn0_reference: float = 38.0
+    cn0_reference: float = 32.0
     elevation_mask: float = 10 * _DEG
     cn0_mask: float = 30.0
     ionosphere: bool = True

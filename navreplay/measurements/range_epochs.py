@@ -148,9 +148,9 @@ def correct_ranges(
         delay += l1 / epochs.carrier**2
     # a signal of unknown strength counts as a strong one
     weakness = 10 ** ((options.cn0_reference - np.nan_to_num(epochs.cn0, nan=np.inf)) / 10)
-    factor = np.sqrt(1 + weakness) / np.sin(np.maximum(elevation, np.radians(3.0)))
-    pseudorange_std = _believe(epochs.pseudorange_std, options.pseudorange_std * factor, options.pseudorange_std_floor)
-    rate_std = _believe(epochs.range_rate_std, options.range_rate_std * factor, options.range_rate_std_floor)
+    factor, sine = np.sqrt(1 + weakness), np.sin(np.maximum(elevation, np.radians(3.0)))
+    pseudorange_std = _believe(epochs.pseudorange_std, options.pseudorange_std * factor / sine, options.pseudorange_std_floor)
+    rate_std = _believe(epochs.range_rate_std, options.range_rate_std * factor / np.sqrt(sine), options.range_rate_std_floor)
     corrected = replace(
         epochs,
         pseudorange=epochs.pseudorange - delay,

@@ -26,7 +26,7 @@ class RangeSection(Section):
     )
     pseudorange_noise_scale: Positive = Field(1.0, description="multiplies the standard deviations of pseudoranges")
     range_rate_noise_scale: Positive = Field(1.0, description="multiplies those of range rates")
-    cn0_reference_dbhz: Positive = Field(38.0, description="strength at which these variances double [dB-Hz]")
+    cn0_reference_dbhz: Positive = Field(32.0, description="strength at which these variances double [dB-Hz]")
     pseudorange_std_floor_m: Positive = Field(0.3, description="least standard deviation of a pseudorange believed [m]")
     range_rate_std_floor_mps: Positive = Field(0.01, description="least standard deviation of a range rate believed [m/s]")
     ionosphere: bool = Field(True, description="correct by the broadcast model what is not corrected yet")
