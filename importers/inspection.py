@@ -97,8 +97,9 @@ def inspect_logs(
     except LogError as error:
         findings.append(Finding("error", "unusable", f"{error}.", ""))
     else:
-        assumptions, recognised = timeline.provenance.assumptions, timeline.provenance.recognised
+        assumptions = timeline.provenance.assumptions
         timeline, vetted = vet(timeline)
+        recognised = timeline.provenance.recognised
         findings += [finding for finding in (*vetted, *preflight(timeline)) if finding.code not in _implied(open_choices)]
     files = tuple(describe_file(log) for log in everything)
     return Inspection(files, channels, tuple(findings), open_choices, assumptions, recognised)

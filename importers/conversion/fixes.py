@@ -1,7 +1,10 @@
 """GNSS rows as a series: positions and velocities of the antenna in NED with believable covariances."""
 
+from dataclasses import replace
+
 import numpy as np
 
+from importers.conversion.position_units import mend_angles
 from importers.conversion.velocity_frame import turn_velocities
 from importers.roles.sources import Joined, account
 from importers.rows.screening import Screening
@@ -72,11 +75,13 @@ def convert_fixes(
     for joined in (position, velocity):
         if joined is None:
             continue
+        joined = _in_degrees(joined)
         screening = Screening(joined.name, len(joined.t_ns))
         screen_positions(screening, joined.rows, _ORDER_OF_STATUS.index(settings.min_status))
         order = screening.order(joined.t_ns)
         if len(order) == 0 and joined is position:
-            raise LogError(f"{joined.name}: none of its {len(joined.t_ns)} fixes is usable: {screening.rejected(slice(None))}")
+            why = ", ".join(f"{count} {reason}" for reason, count in screening.rejected(slice(None)).items())
+            raise LogError(f"{joined.name}: none of its {len(joined.t_ns)} fixes is usable ({why})")
         series, told, frame = _build(joined, order, settings, parts[0] if parts else None)
         notes += [*joined.notes, *screening.notes, *told]
         if series is None:
@@ -89,6 +94,14 @@ def convert_fixes(
     if not parts:
         raise LogError("neither positions nor velocities of a GNSS receiver are usable")
     return (parts[0] if len(parts) == 1 else _merge(*parts)), tuple(uses), tuple(notes), recognised
+
+
+def _in_degrees(joined: Joined) -> Joined:
+    """The rows of messages with their positions in the unit that they are in, and told so."""
+    if joined.rows.lla is None or not any(source.channel.encoding != "text" for source in joined.sources):
+        return joined
+    lla, note = mend_angles(joined.name, joined.t_ns, joined.rows.lla)
+    return replace(joined, rows=replace(joined.rows, lla=lla), notes=(*joined.notes, note)) if note else joined
 
 
 def _unused(use: ChannelUse) -> ChannelUse:

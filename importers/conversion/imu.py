@@ -37,7 +37,8 @@ def convert_imu(
     screening.reject(beyond, "beyond any sensor")
     order = screening.order(joined.t_ns)
     if len(order) == 0:
-        raise LogError(f"{joined.name}: none of its {len(joined.t_ns)} samples is usable: {screening.rejected(slice(None))}")
+        why = ", ".join(f"{count} {reason}" for reason, count in screening.rejected(slice(None)).items())
+        raise LogError(f"{joined.name}: none of its {len(joined.t_ns)} samples is usable ({why})")
     gyro_unit, accel_unit, notes = _find_units(joined.name, rows, order, settings)
     axes = rows.sensor_axes if settings.axes == "auto" else settings.axes
     gyro_axes = axes if settings.gyro_axes == "auto" else settings.gyro_axes
@@ -56,6 +57,7 @@ def convert_imu(
         settings.increments or rows.means,
     )
     found = {"axes": axes, "gyro_unit": gyro_unit, "accel_unit": accel_unit}
+    found = {key: value for key, value in found.items() if key != "axes" or not any(settings.mounting_deg)}
     recognised = {f"input.imu.{key}": value for key, value in found.items() if getattr(settings, key) == "auto"}
     return series, account(joined, screening), (*joined.notes, *screening.notes, *notes), recognised
 
@@ -76,7 +78,10 @@ def _find_units(name: str, rows: Rows, order: np.ndarray, settings: ImuInput) ->
     gyro_unit, accel_unit = settings.gyro_unit, settings.accel_unit
     if accel_unit == "auto":
         force = float(np.median(np.linalg.norm(rows.accel[order], axis=1)))
-        in_g = not rows.units_known and _G_RANGE[0] < force < _G_RANGE[1]
+        steady = float(
+            np.linalg.norm(np.median(rows.accel[order], axis=0))
+        )  # gravity is; the rest of a drive points everywhere
+        in_g = not rows.units_known and _G_RANGE[0] < force < _G_RANGE[1] and steady > force / 2
         accel_unit = "g" if in_g else "m/s2"
         if in_g:
             notes.append(f"{name}: its specific force has a median of {force:.3f}, so it is taken as g")

@@ -14,6 +14,10 @@ from navreplay.timeline import GnssFixSeries, ImuSeries, Timeline, Times, Trajec
 
 __all__ = ["Finding", "preflight"]
 
+_STEADY = 0.05
+_RAW = (
+    "Record the raw accelerometer output (of a phone 'accelerometer', not 'linear acceleration'); a filter needs gravity in it."
+)
 _LEVELS = ("error", "warning", "info")
 _LEAST_RATE_HZ = 20.0
 _GAP_FACTOR = 3.0
@@ -68,6 +72,12 @@ def _check_gravity(imu: ImuSeries, fixes: GnssFixSeries | None) -> list[Finding]
     force = np.median(imu.accel, axis=0)
     size = float(np.median(np.linalg.norm(imu.accel, axis=1)))
     expected = _local_gravity(fixes)
+    if np.linalg.norm(force) < _STEADY * expected and size < 0.5 * expected:
+        text = (
+            f"The specific force is usually {size:.2f} m/s^2 and points everywhere, with a median of only "
+            f"{np.linalg.norm(force):.2f} m/s^2: gravity has been removed from the accelerations."
+        )
+        return [Finding("error", "no-gravity", text, _RAW)]
     if abs(size - 1) < 0.15:
         text = f"The specific force is usually {size:.3f}, not {expected:.2f} m/s^2: the accelerometers seem to be in g."
         return [Finding("error", "accel-unit", text, "Set input.imu.accel_unit = 'g'.")]
@@ -75,7 +85,7 @@ def _check_gravity(imu: ImuSeries, fixes: GnssFixSeries | None) -> list[Finding]
         text = (
             f"The specific force is usually only {size:.2f} m/s^2: gravity seems to have been removed from the accelerations."
         )
-        return [Finding("error", "no-gravity", text, "Record the raw accelerometer output; a filter needs gravity in it.")]
+        return [Finding("error", "no-gravity", text, _RAW)]
     if abs(size / expected - 1) > 0.3:
         text = (
             f"The specific force is usually {size:.4g} m/s^2 where gravity is {expected:.2f}: its unit is probably another one."

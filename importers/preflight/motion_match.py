@@ -24,6 +24,8 @@ _MOST_INTERVALS = 3000
 _SHORTEST_INTERVAL_NS = 10**9
 _JITTER_NS = 5 * 10**7
 _LONGEST_INTERVAL_S = 2.5
+_FARTHER_S = (2.0, 4.0)
+_CLEAR = 0.6
 _FASTEST_TURN = 1.0
 _OUTLIER = 5.0
 _AMBIGUOUS = 0.1
@@ -65,8 +67,20 @@ class _Motion:
 def match_yaw(imu: ImuSeries, fixes: GnssFixSeries) -> YawMatch | None:
     """Correlates the yaw rate (about the vertical, whatever way the IMU is mounted) with the course rate over all time
     offsets up to 25 s, or up to 3 s where the log is short."""
-    motion = _gnss_motion(imu, fixes)
     turn = _grid_integral(imu, imu.gyro @ -_up(imu))
+    best = _match(_gnss_motion(imu, fixes), turn)
+    if fixes.has_velocity.sum() >= _MIN_INTERVALS:
+        return best
+    for every_s in _FARTHER_S:  # the course of positions near each other is mostly noise
+        if best is not None and abs(best.correlation) >= _CLEAR:
+            break
+        other = _match(_gnss_motion(imu, fixes, every_s), turn)
+        if other is not None and (best is None or abs(other.correlation) > abs(best.correlation)):
+            best = other
+    return best
+
+
+def _match(motion: _Motion, turn: Floats) -> YawMatch | None:
     for limit in (_LONGEST_LAG_S, _SHORT_LAG_S):
         inside = (motion.start_s > limit) & (motion.end_s < (len(turn) - 1) * _GRID_S - limit)
         rate = motion.course_rate[inside]
@@ -106,21 +120,23 @@ def _grid_integral(imu: ImuSeries, signal: Floats) -> Floats:
     return np.asarray(np.interp(np.arange(0.0, min(seconds[-1], _LONGEST_S) + _GRID_S, _GRID_S), seconds, total))
 
 
-def _gnss_motion(imu: ImuSeries, fixes: GnssFixSeries) -> _Motion:
-    """Course and speed of consecutive fixes; from the positions where the log holds no velocities."""
+def _gnss_motion(imu: ImuSeries, fixes: GnssFixSeries, every_s: float = 0.0) -> _Motion:
+    """Course and speed of consecutive fixes; from the positions where the log holds no velocities, at least every_s apart."""
     if fixes.has_velocity.sum() >= _MIN_INTERVALS:
         t_ns, vel = fixes.t_ns[fixes.has_velocity], fixes.vel_n[fixes.has_velocity]
     else:
         t_ns, lla = fixes.t_ns[fixes.has_position], fixes.lla[fixes.has_position]
+        apart = _thin(t_ns, round(every_s * 1e9)) if every_s else slice(None)
+        t_ns, lla = t_ns[apart], lla[apart]
         step = np.diff(t_ns)[:, None] / 1e9
         vel = ned_between(lla[:-1], lla[1:]) / step
         t_ns = (t_ns[:-1] + t_ns[1:]) // 2
-    chosen = _thin(t_ns)
+    chosen = _thin(t_ns, _SHORTEST_INTERVAL_NS)
     seconds, vel = (t_ns[chosen] - imu.t_ns[0]) / 1e9, vel[chosen]
     speed, course = np.hypot(vel[:, 0], vel[:, 1]), np.arctan2(vel[:, 1], vel[:, 0])
     length = np.diff(seconds)
     rate, acceleration = wrap_angle(np.diff(course)) / length, np.diff(speed) / length
-    fast = (np.minimum(speed[:-1], speed[1:]) > _MIN_SPEED) & (length < _LONGEST_INTERVAL_S)
+    fast = (np.minimum(speed[:-1], speed[1:]) > _MIN_SPEED) & (length < max(_LONGEST_INTERVAL_S, 1.5 * every_s))
     sane = (np.abs(rate) < _FASTEST_TURN) & (np.abs(acceleration) < _HARDEST_BRAKING)
     chosen = np.flatnonzero(fast & sane)
     if len(chosen) > _MOST_INTERVALS:
@@ -128,17 +144,23 @@ def _gnss_motion(imu: ImuSeries, fixes: GnssFixSeries) -> _Motion:
     return _Motion(seconds[:-1][chosen], seconds[1:][chosen], rate[chosen], acceleration[chosen])
 
 
-def _thin(t_ns: Times) -> NDArray[np.intp]:
-    """Indices of the first time in every second: differences over shorter intervals are mostly noise."""
+def _thin(t_ns: Times, interval_ns: int) -> NDArray[np.intp]:
+    """Indices of the first time in every interval: differences over shorter ones are mostly noise."""
     if len(t_ns) == 0:
         return np.empty(0, dtype=np.intp)
-    return np.unique((t_ns - t_ns[0] + _JITTER_NS) // _SHORTEST_INTERVAL_NS, return_index=True)[1]
+    return np.unique((t_ns - t_ns[0] + _JITTER_NS) // interval_ns, return_index=True)[1]
 
 
 def _mean_rate(total: Floats, start_s: Floats, end_s: Floats) -> Floats:
     """Mean of a signal over intervals, from its integral on the grid."""
-    grid = np.arange(len(total))
-    return np.asarray((np.interp(end_s / _GRID_S, grid, total) - np.interp(start_s / _GRID_S, grid, total)) / (end_s - start_s))
+    return np.asarray((_at(total, end_s / _GRID_S) - _at(total, start_s / _GRID_S)) / (end_s - start_s))
+
+
+def _at(total: Floats, place: Floats) -> Floats:
+    """Values between those of a grid, at places (k,) counted in its steps; held beyond its ends."""
+    below = np.clip(np.floor(place), 0, max(len(total) - 2, 0)).astype(np.intp)
+    above = np.minimum(below + 1, len(total) - 1)
+    return np.asarray(total[below] + np.clip(place - below, 0.0, 1.0) * (total[above] - total[below]))
 
 
 def _best_lag(turn: Floats, start_s: Floats, end_s: Floats, rate: Floats, limit: float) -> YawMatch:

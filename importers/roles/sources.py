@@ -23,6 +23,9 @@ __all__ = ["Clock", "Joined", "Source", "account", "join_sources"]
 _EARLIEST_UNIX_NS = 631_152_000 * 10**9
 _MOST_DELAY_NS = 5e9
 _RESTART_NS = 10**9
+_LONGEST_ON_NS = 10 * 365 * 86_400 * 10**9
+_NOMINAL_NS = 2087 * 604_800 * 10**9
+"""A day that stands for the unknown one, in GPS time."""
 _WITHOUT_ORIENTATION = frozenset({"imu", "accel"})
 """Roles that an orientation beside the rates serves nothing; of a long log it would be the larger part."""
 
@@ -89,7 +92,10 @@ def join_sources(
 
 def _mended(source: Source, t_ns: Times, notes: list[str]) -> Times:
     """Stamps without the batches of a driver and the steps of a clock."""
-    mended, told = mend_stamps(t_ns)
+    by_recorder = (
+        source.table.log_time_ns if source.channel.encoding != "text" and len(source.table.log_time_ns) == len(t_ns) else None
+    )
+    mended, told = mend_stamps(t_ns, by_recorder)
     notes += [f"{source.channel.name}: {note}" for note in told]
     return mended
 
@@ -165,7 +171,8 @@ def _times(
     if offset_ns:
         notes.append(f"{name}: {settings.time_offset_s:g} s were added to its stamps")
     if "t_gps_ns" in table.columns:
-        return np.asarray(table.columns["t_gps_ns"], dtype=np.int64) + offset_ns
+        t_ns = np.asarray(table.columns["t_gps_ns"], dtype=np.int64) + offset_ns
+        return _dated(source.channel, t_ns, notes)
     stamps = stamp_column(table) if getattr(settings, "stamp", "header") == "header" else None
     if stamps is None:
         notes.append(f"{name}: timed by the clock of the recorder, taken as UTC")
@@ -178,6 +185,17 @@ def _times(
     if settings.time_base == "auto":
         notes.append(f"{name}: its stamps are taken as UTC")
     return gps_from_stamps(stamps, settings.time_base, clock.leap) + offset_ns
+
+
+def _dated(channel: Channel, t_ns: Times, notes: list[str]) -> Times:
+    """Times of a table that count from power-on, on a day of their own, the same for all such tables: sensors of one clock
+    agree though nobody knows the date."""
+    if not channel.type.startswith("csv/") or len(t_ns) == 0 or not 0 <= t_ns.min() <= t_ns.max() < _LONGEST_ON_NS:
+        return t_ns
+    notes.append(
+        f"{channel.name}: its times count from power-on; they are told as if that had been at 2020-01-05 00:00 GPS time"
+    )
+    return t_ns + _NOMINAL_NS
 
 
 def _counts_from_power_on(stamps: Times, table: Table) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 
 from navreplay.timeline import Floats
 
-__all__ = ["Guess", "guess_angle_unit", "guess_quantities", "guess_time", "unit_in"]
+__all__ = ["Guess", "guess_angle_unit", "guess_counter", "guess_quantities", "guess_time", "unit_in"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +23,7 @@ class Guess:
 _UNIT_ENDS = {
     "deg": "deg", "rad": "rad", "e7": "1e-7 deg", "degps": "deg/s", "dps": "deg/s", "radps": "rad/s", "rads": "rad/s",
     "mps": "m/s", "ms": "m/s", "cmps": "cm/s", "mmps": "mm/s", "kmh": "km/h", "kmph": "km/h", "kn": "kn", "knots": "kn",
-    "mps2": "m/s2", "ms2": "m/s2", "mg": "mg", "m": "m", "cm": "cm", "mm": "mm", "ft": "ft",
+    "mph": "mph", "mps2": "m/s2", "ms2": "m/s2", "mg": "mg", "m": "m", "cm": "cm", "mm": "mm", "ft": "ft",
 }  # fmt: skip
 _BRACKET = re.compile(r"(.*?)\s*[\[(]([^\[\]()]*[^\[\]()\d][^\[\]()]*|m/s2)[\])]\s*")
 _BRACKET_UNITS = {
@@ -54,6 +54,9 @@ _BRACKET_UNITS = {
     "kph": "km/h",
     "knots": "kn",
     "kt": "kn",
+    "mph": "mph",
+    "ft/s": "ft/s",
+    "fps": "ft/s",
     "mps2": "m/s2",
     "feet": "ft",
     "meters": "m",
@@ -85,6 +88,7 @@ _VECTORS = {
     "gyro": r"gyro|gyroscope|gyr|omega|rates?|angvel|angularrates?|angularvelocity|angularvel|angrate",
     "accel": r"acc|accel|acceleration|accelerometer|linearacceleration|linacc|specificforce",
 }
+_VELOCITY = ("vel_n", "vel_e", "vel_d", "vel_u")
 _FAMILY = {
     "lat": "angle",
     "lon": "angle",
@@ -95,7 +99,9 @@ _FAMILY = {
     "vel": "speed",
 }
 _DEFAULT = {"angle": "deg", "rate": "rad/s", "force": "m/s2", "speed": "m/s"}
-_TIME = re.compile(r".*(time|stamp|tow|utc).*|t(ns|us|ms|s)?")
+_TIME = re.compile(r".*(time|stamp|tow|utc|unix|epoch|clock).*|t(ns|us|ms|s)?")
+_COUNTER = re.compile(r".*(time|stamp|uptime|micros|millis|nanos|ticks|elapsed|clock).*|t(ns|us|ms|s)?|us|ms|ns|sec(onds?)?")
+_COUNTER_UNITS = {"micros": "us", "millis": "ms", "nanos": "ns", "us": "us", "ms": "ms", "ns": "ns"}
 
 
 def guess_angle_unit(lat: Floats, lon: Floats) -> tuple[str, str]:
@@ -169,16 +175,16 @@ def _unit_of(quantity: str, values: Floats) -> str:
         return "deg/s" if float(np.nanmax(np.abs(values))) > 20 else "rad/s"
     if family == "force":
         return "g" if 0.5 < size < 1.5 else "mg" if 500 < size < 1500 else "m/s2"
-    if family == "speed":
-        return "mm/s" if whole and size > 200 else "m/s"
+    if family == "speed":  # no vehicle on a road or in the air does 500 m/s
+        return "mm/s" if whole and (size > 200 or float(np.nanmax(np.abs(values))) > 500) else "m/s"
     return "mm" if whole and (size > 20_000 or quantity.startswith("std")) else "m"
 
 
 def _with_family_units(found: dict[str, Guess], fields: Mapping[str, Floats]) -> dict[str, Guess]:
-    """Scalar accelerations and rates: the unit of all three axes together."""
-    for kind in ("gyro", "accel"):
-        axes = [f"{kind}_{axis}" for axis in "xyz"]
-        if all(axis in found and fields.get(found[axis].path, np.empty((0, 0))).ndim == 1 for axis in axes):
+    """Scalar accelerations, rates and velocities: the unit of all axes together."""
+    for kind in ("gyro", "accel", "vel"):
+        axes = [f"{kind}_{axis}" for axis in "xyz"] if kind != "vel" else [axis for axis in _VELOCITY if axis in found]
+        if axes and all(axis in found and fields.get(found[axis].path, np.empty((0, 0))).ndim == 1 for axis in axes):
             whole = np.column_stack([fields[found[axis].path] for axis in axes])
             if not any(_names_and_unit(found[axis].path)[1] for axis in axes):
                 unit = _unit_of(axes[0], whole)
@@ -205,4 +211,20 @@ def guess_time(fields: Mapping[str, Floats]) -> tuple[str, str, str, str] | None
         if "tow" in plain and 0 <= middle < 604_800_000:
             unit = "ms" if middle > 604_800 else "s"
             return path, unit, "gps_tow", f"median {middle:.6g}: {unit} of the GPS week"
+    return None
+
+
+def guess_counter(fields: Mapping[str, Floats]) -> tuple[str, str, str, str] | None:
+    """Field, unit (``auto`` where the name tells none), base and reason of a count from power-on: named as a time, and growing
+    but for turns of its 32 bits."""
+    for path, values in fields.items():
+        plain = path.replace("_", "").lower().rpartition(".")[2]
+        if values.ndim != 1 or not _COUNTER.fullmatch(re.sub(r"[^a-z]", "", plain)) or len(values) < 2:
+            continue
+        steps = np.diff(values)
+        grows = (steps >= 0) | (steps < -(2.0**31))
+        if np.isfinite(values).all() and (values >= 0).all() and grows.all() and (steps > 0).any():
+            named = next((unit for word, unit in _COUNTER_UNITS.items() if plain.endswith(word)), unit_in(path))
+            unit = named if named in ("s", "ms", "us", "ns") else "auto"
+            return path, unit, "boot", f"it grows from {values[0]:.9g}: a count from power-on"
     return None

@@ -16,15 +16,19 @@ _BESIDE = 20
 _REGULAR = 3.0
 _LONGEST_STEP_NS = 60_000_000_000
 _LEAST_BATCH = 3.0
+_SECOND_NS = 10**9
+_LEAST_STEP_NS = 2 * 10**8
 
 
-def mend_stamps(t_ns: Times) -> tuple[Times, tuple[str, ...]]:
-    """Stamps (n,) in the order of the file, with batches spread and steps back of the clock undone, and sentences on what was
-    done."""
+def mend_stamps(t_ns: Times, log_time_ns: Times | None = None) -> tuple[Times, tuple[str, ...]]:
+    """Stamps (n,) in the order of the file, with batches spread and steps of the clock undone, and sentences on what was done.
+    log_time_ns: (n,) by the clock of the recorder, where there is one."""
     if len(t_ns) < _LEAST_ROWS:
         return t_ns, ()
     notes: list[str] = []
     t_ns = _spread_batches(t_ns, notes)
+    if log_time_ns is not None:
+        t_ns = _undo_against_recorder(t_ns, log_time_ns, notes)
     return _undo_steps(t_ns, notes), tuple(notes)
 
 
@@ -42,7 +46,14 @@ def _spread_batches(t_ns: Times, notes: list[str]) -> Times:
     if (gap <= 0).any():
         return t_ns
     batch = np.repeat(np.arange(len(first)), sizes)
-    behind = sizes[batch] - 1 - (np.arange(len(t_ns)) - first[batch])
+    place = np.arange(len(t_ns)) - first[batch]
+    if (stamps % _SECOND_NS == stamps[0] % _SECOND_NS).all():
+        ahead = np.rint(_SECOND_NS * place / np.maximum(sizes[batch], usual)).astype(np.int64)
+        notes.append(
+            f"stamps are whole seconds for {usual:.0f} rows each; the rows were spread over the second that begins there"
+        )
+        return np.asarray(stamps[batch] + ahead)
+    behind = sizes[batch] - 1 - place
     spread = stamps[batch] - np.rint(gap[batch] * behind / sizes[batch]).astype(np.int64)
     notes.append(
         f"stamps come in batches of {usual:.0f}; each batch was spread over the time since the one before, its stamp being "
@@ -50,6 +61,34 @@ def _spread_batches(t_ns: Times, notes: list[str]) -> Times:
         "its last sample"
     )
     return spread
+
+
+def _undo_against_recorder(t_ns: Times, log_time_ns: Times, notes: list[str]) -> Times:
+    """Steps of the stamps that the recorder's clock, which ran on evenly, did not see: every stretch gets the delay against it
+    of the one that agrees with it best."""
+    delay = (log_time_ns - t_ns).astype(np.float64)
+    steps, logged = np.diff(t_ns).astype(np.float64), np.diff(log_time_ns).astype(np.float64)
+    odd = np.abs(logged - steps) > max(_LEAST_STEP_NS, 20 * float(np.median(np.abs(np.diff(delay)))))
+    at = np.flatnonzero(odd & (np.abs(steps - np.median(steps)) > np.abs(logged - np.median(logged))))
+    if not 0 < len(at) <= _MOST_STEPS:
+        return t_ns
+    pieces = np.split(np.arange(len(t_ns)), at + 1)
+    middle = np.array([np.median(delay[piece]) for piece in pieces])
+    spread = max(float(np.median(np.abs(delay[piece] - level))) for piece, level in zip(pieces, middle, strict=True))
+    apart = np.abs(np.diff(middle))
+    if min(map(len, pieces)) < _BESIDE or not (_LEAST_STEP_NS + 10 * spread < apart).all() or apart.max() > _LONGEST_STEP_NS:
+        return t_ns
+    right = float(middle[np.argmin(np.abs(middle))])
+    mended = t_ns.copy()
+    for piece, level in zip(pieces, middle, strict=True):
+        mended[piece] += round(level - right)
+    for row, step in zip(at.tolist(), np.diff(middle).tolist(), strict=True):
+        way = "back" if step > 0 else "forward"
+        notes.append(
+            f"the clock of its stamps was set {way} by {abs(step) / 1e9:.3f} s behind row {row + 1}, against the clock of the "
+            "recorder; all are stamped as where the two agree best"
+        )
+    return mended
 
 
 def _undo_steps(t_ns: Times, notes: list[str]) -> Times:

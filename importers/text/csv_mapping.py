@@ -13,7 +13,7 @@ from importers.settings import Column, CsvMapping, CsvTime
 from importers.text.csv_ranges import range_columns
 from importers.text.csv_units import in_si
 from importers.text.table import Selection, TextTable, head_cells, parse_text, read_bytes, select_columns
-from importers.text.times import check_rounding, read_counts, read_dates
+from importers.text.times import check_rounding, read_counts, read_dates, unroll_32_bits
 from navreplay.geodesy.earth import lla_from_ecef
 from navreplay.geodesy.rotation import quat_from_euler
 from navreplay.geodesy.time_scales import LeapSeconds, gps_from_utc
@@ -26,7 +26,7 @@ _FASTEST_S = 0.11
 """Rows further apart are those of a receiver, whose repeats mean something else."""
 _LEAST_REPEATS = 30
 _STATUS = {"none": NO_FIX} | {status.name.lower(): int(status) for status in FixStatus}
-_TEXTS = ("status", "sat", "signal")
+_TEXTS = ("status", "sat", "signal", "ns", "ew")
 _GROUPS = {
     "gyro": ("gyro_x", "gyro_y", "gyro_z"),
     "accel": ("accel_x", "accel_y", "accel_z"),
@@ -93,13 +93,25 @@ def read_mapped(path: str, mapping: CsvMapping, gps_week: int | None, leap: Leap
     selection = select_columns(text, numbers, texts, counted)
     if selection.read == 0:
         raise LogError(f"{path}: the file holds no rows")
+    selection, rolled = _unrolled(selection, mapping.time)
     t_ns, timed = _read_times(selection, mapping.time, gps_week, leap, place)
     out, notes = _build_columns(selection, mapping, timed, place)
     rejected = dict(selection.rejected)
     if not timed.all():
         rejected["no time"] = int((~timed).sum())
-    table = Table(t_ns, out | {"t_gps_ns": t_ns}, selection.read, rejected, notes)
+    table = Table(t_ns, out | {"t_gps_ns": t_ns}, selection.read, rejected, (*rolled, *notes))
     return _changes(table) if mapping.role == "fix" else table
+
+
+def _unrolled(selection: Selection, time: CsvTime) -> tuple[Selection, tuple[str, ...]]:
+    """The rows with counts that go on where their 32 bits turned over, and a sentence on that."""
+    if time.base.startswith("datetime") or time.base == "gps_tow" or "time 0" not in selection.columns:
+        return selection, ()
+    count, turns = unroll_32_bits(selection.columns["time 0"])
+    if not turns:
+        return selection, ()
+    note = f"its counter of 32 bits turned over {'once' if turns == 1 else f'{turns} times'}; the count goes on there"
+    return Selection({**selection.columns, "time 0": count}, selection.read, selection.rejected), (note,)
 
 
 def _counts_ns(text: TextTable, times: dict[str, int], time: CsvTime) -> bool:

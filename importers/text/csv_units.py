@@ -28,6 +28,10 @@ def in_si(columns: Mapping[str, np.ndarray], mapping: CsvMapping) -> tuple[dict[
         unit, reason = (mapping.angle_unit, "") if mapping.angle_unit != "auto" else guess_angle_unit(lat, lon)
         notes += [f"angle_unit of latitude and longitude taken as {unit} ({reason})"] if reason and unit != "deg" else []
         out |= {"lat": _angle(lat, unit), "lon": _angle(lon, unit)}
+    for name, letters, negative in (("lat", "ns", "S"), ("lon", "ew", "W")):
+        if letters in out and name in out:
+            other = np.char.startswith(np.char.upper(np.char.strip(out.pop(letters).astype(str))), negative)
+            out[name] = np.where(other, -np.abs(out[name]), out[name])
     return _with_parts(out), tuple(notes)
 
 

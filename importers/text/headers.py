@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import tomlkit
 
-from importers.rows.field_names import Guess, guess_angle_unit, guess_quantities, guess_time, unit_in
+from importers.rows.field_names import Guess, guess_angle_unit, guess_counter, guess_quantities, guess_time, unit_in
 from importers.settings import CsvMapping
-from importers.text.table import TextTable, head_cells, parse_text
+from importers.text.table import TextTable, head_cells, number_of_lettered, parse_text
 from navreplay.timeline import Floats, LogError
 
 __all__ = ["TableDraft", "draft_table"]
@@ -28,6 +28,11 @@ _DATED = re.compile(
 _CLOCK = re.compile(r"\s*\d{1,2}:\d\d:\d\d(?:[.,]\d*)?\s*(Z|UTC|[AaPp]\.?[Mm]\.?)?\s*")
 _TIMES_OF_DAY = re.compile(r".*(time|utc|clock).*")
 _HEAD_ROWS = 20
+_PLACES = re.compile(r".*(lat|lon|lng).*", re.IGNORECASE)
+_HEMISPHERES = {
+    "ns": re.compile(r"n/?s|(lat(itude)?)(dir(ection)?|ref|hemi(sphere)?|ns)|(ns|n/?s)(ind(icator)?|hemi(sphere)?)"),
+    "ew": re.compile(r"e/?w|(lon(gitude)?|lng)(dir(ection)?|ref|hemi(sphere)?|ew)|(ew|e/?w)(ind(icator)?|hemi(sphere)?)"),
+}
 _NOT_SI = {"gyro": "rad/s", "accel": "m/s2", "vel": "m/s", "speed": "m/s", "height": "m", "std": "m", "course": "deg"}
 
 
@@ -62,8 +67,21 @@ def draft_table(path: str, head: bytes) -> TableDraft | None:
             f"{first[:200]}); name it with time.column and time.base of an [[input.csv]]"
         )
     drafts = [_mapping(path, role, needed, guesses, fields, time) for role, needed in roles]
+    for values, _ in drafts:
+        values["columns"] |= _hemispheres(table) if values["role"] == "fix" else {}
     mappings = tuple(CsvMapping.model_validate(values) for values, _ in drafts)
     return TableDraft(mappings, tuple(line for values, reasons in drafts for line in _toml(values, reasons)))
+
+
+def _hemispheres(table: TextTable) -> dict[str, str]:
+    """Columns of letters that tell south and west."""
+    found = {}
+    for key, pattern in _HEMISPHERES.items():
+        for i, name in enumerate(table.names[: table.frame.shape[1]]):
+            letters = {cell.strip().upper()[:1] for cell in head_cells(table, i)} - {""}
+            if pattern.fullmatch(re.sub(r"[\s_.-]", "", name.lower())) and letters and letters <= set(key.upper()):
+                found[key] = name
+    return found
 
 
 def _first_row(table: TextTable) -> list[str]:
@@ -72,9 +90,13 @@ def _first_row(table: TextTable) -> list[str]:
 
 def _numbers(table: TextTable) -> dict[str, Floats]:
     """Columns (n,) of numbers by the name of each, of those that hold any."""
+    import pandas as pd
+
     fields = {}
     for i, name in enumerate(table.names[: table.frame.shape[1]]):
         column = table.frame[i]
+        if column.dtype.kind not in "fiu" and _PLACES.fullmatch(name):
+            column = pd.to_numeric(number_of_lettered(column), errors="coerce")
         if column.dtype.kind in "fiu" and column.notna().any() and name not in fields:
             fields[name] = column.to_numpy(dtype=np.float64)
     return fields
@@ -82,7 +104,7 @@ def _numbers(table: TextTable) -> dict[str, Floats]:
 
 def _time(table: TextTable, fields: Mapping[str, Floats]) -> tuple[dict[str, Any], str] | None:
     """The time of a mapping, and why."""
-    return _week_and_tow(fields) or _count(fields) or _date(table)
+    return _week_and_tow(fields) or _count(guess_time(fields)) or _date(table) or _count(guess_counter(fields))
 
 
 def _week_and_tow(fields: Mapping[str, Floats]) -> tuple[dict[str, Any], str] | None:
@@ -97,8 +119,7 @@ def _week_and_tow(fields: Mapping[str, Floats]) -> tuple[dict[str, Any], str] | 
     return {"column": second, "base": "gps_tow", "week_column": week}, f"{week} is a GPS week, {second} the time in it"
 
 
-def _count(fields: Mapping[str, Floats]) -> tuple[dict[str, Any], str] | None:
-    found = guess_time(fields)
+def _count(found: tuple[str, str, str, str] | None) -> tuple[dict[str, Any], str] | None:
     if found is None:
         return None
     column, unit, base, reason = found
@@ -138,7 +159,11 @@ def _mapping(
         wanted.remove("vel_u")
     values: dict[str, Any] = {"match": _literal(Path(path).name), "role": role, "time": time[0]}
     values["columns"] = {name: guesses[name].path for name in wanted}
-    units = {name: unit_in(guesses[name].path) for name in wanted if unit_in(guesses[name].path)}
+    units = {
+        name: unit for name in wanted if (unit := unit_in(guesses[name].path) or (guesses[name].unit if role == "fix" else ""))
+    }
+    units |= {name: "" for name in ("lat", "lon") if name in units and not unit_in(guesses[name].path)}
+    units = {name: unit for name, unit in units.items() if unit}
     angles = {units.pop(name) for name in ("lat", "lon") if name in units}
     values["units"] = {
         name: unit for name, unit in units.items() if unit != _NOT_SI.get(name.partition("_")[0]) or role == "imu"

@@ -23,7 +23,7 @@ from navreplay.timeline import LogError
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Selection", "TextTable", "head_cells", "parse_text", "read_bytes", "select_columns"]
+__all__ = ["Selection", "TextTable", "head_cells", "number_of_lettered", "parse_text", "read_bytes", "select_columns"]
 
 _NEWLINE = 10
 _LAST_BLANK = 32
@@ -32,6 +32,7 @@ _INT64 = r"[+-]?(\d{1,18}|[1-8]\d{18})"
 
 
 _LARGEST = 9 * 10**18
+_LETTERED = re.compile(r"\s*([NSEWnsew])?\s*(\d+(?:\.\d*)?)\s*°?\s*([NSEWnsew])?\s*")
 _WRITTEN_AS_REAL = re.compile(r"[+-]?\d{1,19}\.0*|[+-]?\d(\.\d*)?[eE]\+?1\d")
 
 
@@ -107,6 +108,19 @@ def parse_text(
     return TextTable(names, frame, len(starts), rejected, lines, delimiter)
 
 
+def number_of_lettered(cells: "pd.Series") -> "pd.Series":
+    """Degrees of cells such as 8.54E or S 33.9, south and west negative; cells without a letter stay as they are."""
+    return cells.map(_signed)
+
+
+def _signed(cell: object) -> object:
+    match = _LETTERED.fullmatch(cell) if isinstance(cell, str) else None
+    if match is None or (match.group(1) is None) == (match.group(3) is None):
+        return cell
+    letter = (match.group(1) or match.group(3)).upper()
+    return float(match.group(2)) * (-1 if letter in "SW" else 1)
+
+
 def select_columns(
     table: TextTable,
     numbers: Mapping[str, int],
@@ -120,6 +134,14 @@ def select_columns(
     import pandas as pd
 
     frame = _with_integers(table, [numbers[name] for name in integers if name in numbers])
+    lettered = [numbers[name] for name in ("lat", "lon") if name in numbers and not frame.empty]
+    for index in lettered:
+        if not pd.api.types.is_numeric_dtype(frame[index]):
+            frame = (
+                frame.assign(**{str(index): number_of_lettered(frame[index])})
+                .drop(columns=index)
+                .rename(columns={str(index): index})
+            )
     if frame.empty:
         empty = {name: np.empty(0) for name in [*numbers, *(texts or {})]}
         return Selection(empty, table.read, dict(table.rejected))

@@ -14,14 +14,28 @@ from navreplay.timeline import LogError, Times
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["check_rounding", "read_counts", "read_dates", "unit_of_counts"]
+__all__ = ["check_rounding", "read_counts", "read_dates", "unit_of_counts", "unroll_32_bits"]
 
 _UNIT_S = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _WEEK_S = 604_800
+_HALF_32_BITS = 2.0**31
 _DATE = re.compile(r"\s*(\d{1,4})[./-](\d{1,2})[./-](\d{1,4})[\sT,;]*(.*?)\s*")
 _COMPACT = re.compile(r"\s*(\d{4})(\d\d)(\d\d)[T\s_-]*(\d\d):?(\d\d):?(\d\d(?:[.,]\d*)?)\s*(Z|UTC)?\s*")
 _EXPONENT = re.compile(r"\s*[+-]?\d(?:[.,](\d*))?[eE]\+?(\d{1,2})\s*")
 _COARSEST_S = 0.01
+
+
+def unroll_32_bits(count: np.ndarray) -> tuple[np.ndarray, int]:
+    """Counts (n,) without the turns of a counter of 32 bits, and how many there were: steps back by about 2^32 of counts that
+    never reach it."""
+    size = count.astype(np.float64)
+    steps = np.diff(size)
+    back = steps < -_HALF_32_BITS
+    if not back.any() or not (np.nan_to_num(size) < 2 * _HALF_32_BITS).all() or (np.nan_to_num(size) < 0).any():
+        return count, 0
+    turns = np.concatenate([[0], np.cumsum(back) - np.cumsum(steps > _HALF_32_BITS)])  # a late row belongs before the turn
+    whole = turns * int(2 * _HALF_32_BITS)
+    return (count.astype(np.int64) if count.dtype.kind in "iu" else size) + whole, int(turns.max())
 
 
 def unit_of_counts(count: np.ndarray, base: str, place: str) -> str:
@@ -39,7 +53,8 @@ def unit_of_counts(count: np.ndarray, base: str, place: str) -> str:
 
 def _unit_of_steps(known: np.ndarray, place: str) -> str:
     """Samples of a moving sensor come every 0.5 ms to 2 s; seconds go first, and where other units fit alike, none is taken."""
-    step = float(np.median(np.diff(known))) if len(known) > 1 else 0.0
+    steps = np.diff(known)
+    step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0  # rows of one fix repeat their stamp
     fitting = [unit for unit, scale in _UNIT_S.items() if 5e-4 <= step * scale <= 2]
     if len(fitting) == 1 or step <= 2:
         return fitting[0] if fitting else "s"

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from importers.findings import Finding
+from importers.vetting.axes import turn_upright
 from importers.vetting.jumps import leave_out_jumps
 from importers.vetting.repeats import leave_out_repeats
 from importers.vetting.velocities import vet_velocities
@@ -13,17 +14,21 @@ from navreplay.timeline import ChannelUse, Timeline
 
 __all__ = ["vet"]
 
+_AXES_OPEN = {"sensor_msgs/Imu", "csv/imu", "message/imu"}
+"""Types whose axes are a custom at best; those of a layout or a receiver of its own are defined."""
+
 
 def vet(timeline: Timeline) -> tuple[Timeline, tuple[Finding, ...]]:
     """The timeline to use, and what was found wrong with the one that was read.
 
     The reference is never touched. In the accounting of channels a row that is left out whole is rejected, with the reason.
     """
+    timeline, upright = _upright(timeline)
     fixes = timeline.fixes
     if fixes is None:
-        return timeline, ()
+        return timeline, upright
     unrolled = unroll_weeks(fixes, timeline.imu)
-    fixes, findings = unrolled.fixes, [*unrolled.findings]
+    fixes, findings = unrolled.fixes, [*upright, *unrolled.findings]
     channels = timeline.provenance.channels
     for step in (leave_out_repeats, vet_velocities, leave_out_jumps):
         vetted = step(fixes)
@@ -33,6 +38,22 @@ def vet(timeline: Timeline) -> tuple[Timeline, tuple[Finding, ...]]:
     if not findings:
         return timeline, ()
     return replace(timeline, fixes=fixes, provenance=replace(timeline.provenance, channels=channels)), tuple(findings)
+
+
+def _upright(timeline: Timeline) -> tuple[Timeline, tuple[Finding, ...]]:
+    """The timeline with the IMU in axes that gravity agrees with, where nobody told them; a body that is told its attitude may
+    lie as it likes."""
+    recognised = dict(timeline.provenance.recognised)
+    types = {use.type.replace("/msg/", "/") for use in timeline.provenance.channels if use.role == "imu"}
+    promised = not types or not types <= _AXES_OPEN
+    if timeline.imu is None or timeline.attitude is not None or promised or "input.imu.axes" not in recognised:
+        return timeline, ()
+    found = turn_upright(timeline.imu, timeline.fixes, recognised["input.imu.axes"])
+    if found is None:
+        return timeline, ()
+    imu, axes, finding = found
+    provenance = replace(timeline.provenance, recognised=tuple((recognised | {"input.imu.axes": axes}).items()))
+    return replace(timeline, imu=imu, provenance=provenance), (finding,)
 
 
 def _account(channels: Sequence[ChannelUse], vetted: Vetted) -> tuple[ChannelUse, ...]:

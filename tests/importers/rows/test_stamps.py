@@ -55,3 +55,29 @@ def test_disorder_gaps_and_pairs_are_left_alone() -> None:
         mended, notes = mend_stamps(t_ns)
         assert np.array_equal(mended, t_ns)
         assert notes == ()
+
+
+def test_a_step_that_the_recorder_did_not_see_is_undone_either_way():
+    log_time = 1_700_000_000_000_000_000 + np.arange(200) * 10**9 + np.random.default_rng(1).integers(0, 10**7, 200)
+    for step in (-2_500_000_000, 2_500_000_000):
+        true = log_time - log_time % 10**9
+        stamps = true + np.where(np.arange(200) >= 90, step, 0)
+        mended, notes = mend_stamps(stamps, log_time)
+        np.testing.assert_allclose(mended, true, atol=2 * 10**7)
+        assert len(notes) == 1
+        assert any(figure in notes[0] for figure in ("by 2.49", "by 2.50"))
+        assert ("back" in notes[0]) == (step < 0)
+
+
+def test_a_pause_that_both_clocks_saw_stays():
+    t_ns = 1_700_000_000_000_000_000 + np.arange(200) * 10**8 + np.where(np.arange(200) >= 90, 5 * 10**9, 0)
+    mended, notes = mend_stamps(t_ns, t_ns + 10**6)
+    assert mended is t_ns
+    assert notes == ()
+
+
+def test_whole_seconds_begin_with_their_rows():
+    t_ns = 1_700_000_000_000_000_000 + np.arange(500) * 2 * 10**8
+    mended, notes = mend_stamps(t_ns - t_ns % 10**9)
+    np.testing.assert_array_equal(mended, t_ns)
+    assert "whole seconds" in notes[0]

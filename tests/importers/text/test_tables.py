@@ -9,7 +9,7 @@ from importers import load_timeline, open_log
 from importers.inspection import draft_mappings, inspect_logs
 from importers.settings import InputSettings
 from importers.text.table import parse_text, select_columns
-from importers.text.times import read_dates
+from importers.text.times import read_dates, unroll_32_bits
 from navreplay.geodesy.time_scales import LEAP_SECONDS, gps_from_utc
 from navreplay.timeline import LogError
 
@@ -244,3 +244,29 @@ def test_angular_rates_may_have_axes_of_their_own(tmp_path, axes, gyro_axes):
 def test_axes_that_are_no_triad_are_refused(letters):
     with pytest.raises(ValueError, match="axes"):
         InputSettings.model_validate({"imu": {"gyro_axes": letters}})
+
+
+def test_a_counter_of_32_bits_goes_on_where_it_turns():
+    count = (2**32 - 500 + np.arange(0, 1000, 10)) % 2**32
+    whole, turns = unroll_32_bits(count)
+    assert turns == 1
+    np.testing.assert_array_equal(np.diff(whole), 10)
+    assert unroll_32_bits(np.arange(10.0))[1] == 0
+    late = count.copy()
+    late[[50, 49]] = late[[49, 50]]  # a row that comes late belongs before the turn
+    np.testing.assert_array_equal(np.sort(unroll_32_bits(late)[0]), whole)
+
+
+@pytest.mark.parametrize(("cells", "sign"), [(("12.5S", "8.25W"), -1), (("N12.5", "8.25 E"), 1)])
+def test_letters_beside_degrees_tell_the_hemisphere(tmp_path, cells, sign):
+    rows = "".join(f"{1_700_000_000 + i},{cells[0]},{cells[1]},10\n" for i in range(30))
+    (tmp_path / "a.csv").write_text("unix,lat,lon,alt\n" + rows)
+    fixes = load_timeline([tmp_path / "a.csv"]).fixes
+    np.testing.assert_allclose(np.degrees(fixes.lla[0, :2]), [12.5 * sign, 8.25 * sign])
+
+
+def test_columns_of_letters_tell_the_hemisphere(tmp_path):
+    rows = "".join(f"{1_700_000_000 + i},1230.0,S,815.0,W,10\n" for i in range(30))
+    (tmp_path / "a.csv").write_text("unix,latitude,N/S,longitude,E/W,alt\n" + rows)
+    fixes = load_timeline([tmp_path / "a.csv"]).fixes
+    np.testing.assert_allclose(np.degrees(fixes.lla[0, :2]), [-12.5, -8.25])
