@@ -1,6 +1,6 @@
 """What a filter run can be told: IMU noise, alignment, gating, gaps, output. SI units and radians throughout."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf, pi
 from typing import Literal
 
@@ -178,11 +178,32 @@ class MotionOptions:
 
 @dataclass(frozen=True, slots=True)
 class VehicleOptions:
-    """What is known of a vehicle's motion. zero_velocity: where the IMU shows that it stands still, its velocity is measured to
-    be zero, with standard deviation zero_velocity_std [m/s] per axis."""
+    """What is known of a vehicle's motion.
+
+    zero_velocity: where the IMU shows that it stands still, its velocity is measured to be zero, with standard deviation
+    zero_velocity_std [m/s] per axis. zero_rate: there its angular rate too. no_slip: at rear_axle (forward, right, down from
+    the IMU in body axes [m], its place along the vehicle known to arm_std [m]; None: nobody knows) it moves neither sideways
+    nor up, with standard deviations slip_std of the lateral and vertical velocity [m/s] and a slip angle of
+    slip_per_acceleration [rad s^2/m] times the lateral acceleration. mounting: pitch and yaw [rad] of its axes in the body's
+    (None: to be found in the log), known to mounting_std [rad]. doubted: (start, end) of stops [GPS ns] that are not believed.
+    """
 
     zero_velocity: bool = False
     zero_velocity_std: float = 0.01
+    zero_rate: bool = False
+    no_slip: bool = False
+    rear_axle: tuple[float, float, float] | None = None
+    arm_std: float = 0.0
+    slip_std: tuple[float, float] = (0.1, 0.1)
+    mounting: tuple[float, float] | None = None
+    mounting_std: float = 1 * _DEG
+    slip_per_acceleration: float = 0.005
+    doubted: tuple[tuple[int, int], ...] = ()
+
+    @property
+    def free(self) -> "VehicleOptions":
+        """The same with nothing that holds the vehicle."""
+        return replace(self, zero_velocity=False, zero_rate=False, no_slip=False)
 
 
 @dataclass(frozen=True, slots=True)

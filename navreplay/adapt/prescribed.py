@@ -9,6 +9,8 @@ When well specified (all ratios 1): mean NEES per state 0.9 to 1.1, NIS per comp
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from navreplay.adapt.ratio import scale_noise
 from navreplay.timeline import Floats
 from navreplay.update.adapter import Adaptation
@@ -19,7 +21,7 @@ __all__ = ["Prescribed"]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Prescribed:
-    """ratios: by epoch [ns], (m,) ratio of used to told variance of its components."""
+    """ratios: by epoch [ns], (m,) ratio of used to told variance of its first components; those behind keep their told R."""
 
     ratios: Mapping[int, Floats] = field(default_factory=dict)
 
@@ -29,5 +31,8 @@ class Prescribed:
     def adapt(self, state: None, prior: Gaussian, innovation: Innovation) -> Adaptation[None]:
         """The told R scaled as prescribed."""
         ratio = self.ratios.get(innovation.t_ns)
-        noise = innovation.noise if ratio is None else scale_noise(innovation.noise, ratio)
+        if ratio is None:
+            return Adaptation(prior, innovation.noise, state)
+        kept = np.ones(len(innovation.residual) - len(ratio))
+        noise = scale_noise(innovation.noise, np.append(ratio, kept))
         return Adaptation(prior, noise, state)

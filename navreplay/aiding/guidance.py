@@ -1,13 +1,16 @@
-"""What aids a filter: fixes or ranges, attitudes and standstill beside them, or attitudes alone."""
+"""What aids a filter: fixes or ranges, attitudes and what is known of the vehicle beside them, or attitudes alone."""
 
 from dataclasses import dataclass
+
+import numpy as np
 
 from navreplay.aiding.attitudes import AttitudeAiding
 from navreplay.aiding.epochs import Aiding
 from navreplay.aiding.fixes import FixAiding
 from navreplay.aiding.joint import JointAiding, JointGate
+from navreplay.aiding.no_slip import NoSlipAiding, no_slip_times
 from navreplay.aiding.ranges import RangeAiding
-from navreplay.aiding.standstill import StandstillAiding, standstill_candidates
+from navreplay.aiding.standstill import StandstillAiding, standstill_candidates, stop_rates
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.error_models.launch_inertial import inertial_model
 from navreplay.error_models.ned import NedErrorModel
@@ -17,13 +20,15 @@ from navreplay.options import FilterOptions, GateOptions, VehicleOptions
 from navreplay.start.alignment import align
 from navreplay.start.heading import Sources
 from navreplay.start.told import start_as_told
-from navreplay.timeline import Floats, ImuSeries, LogError, Timeline
+from navreplay.timeline import Floats, ImuSeries, LogError, Timeline, Times
 from navreplay.update.gate import Gate
 from navreplay.update.range_gate import RangeGate
 from navreplay.update.record import Recorder
 from navreplay.update.verdict import EpochGate
 
 __all__ = ["Guidance", "Start", "choose_guidance"]
+
+Beside = AttitudeAiding | StandstillAiding | NoSlipAiding
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -42,7 +47,7 @@ class Guidance:
     inertial: error model of the IMU."""
 
     main: FixAiding | RangeAiding | AttitudeAiding
-    others: tuple[AttitudeAiding | StandstillAiding, ...]
+    others: tuple[Beside, ...]
     aiding: Aiding
     inertial: NedErrorModel
 
@@ -87,26 +92,46 @@ def choose_guidance(timeline: Timeline, options: FilterOptions, recorder: Record
         if attitude is None or options.use not in ("auto", "attitudes"):
             raise _nothing_to_use(options)
         alone = AttitudeAiding(attitude, model, options.attitude)
-        if options.vehicle.zero_velocity:
-            text = "vehicle.zero_velocity is not used: without fixes nothing tells which IMU noise is that of standstill"
+        if options.vehicle.free != options.vehicle:
+            text = (
+                "vehicle.zero_velocity and what else is known of the vehicle are not used: without fixes nothing tells which "
+                "IMU noise is that of standstill"
+            )
             recorder.tell(int(timeline.imu.t_ns[0]), "warning", text)
         return Guidance(alone, (), alone, model)
-    others: list[AttitudeAiding | StandstillAiding] = []
+    others: list[Beside] = []
     if attitude is not None:
         others.append(AttitudeAiding(attitude, main.model, options.attitude))
-    if options.vehicle.zero_velocity:
-        others.append(_aid_by_standstill(timeline.imu, main, options.vehicle, recorder))
+    others += _aid_by_vehicle(timeline.imu, main, options, recorder)
     aiding: Aiding = JointAiding((main, *others)) if others else main
     return Guidance(main, tuple(others), aiding, model)
 
 
-def _aid_by_standstill(
-    imu: ImuSeries, main: FixAiding | RangeAiding, options: VehicleOptions, recorder: Recorder
-) -> StandstillAiding:
+def _aid_by_vehicle(
+    imu: ImuSeries, main: FixAiding | RangeAiding, options: FilterOptions, recorder: Recorder
+) -> list[StandstillAiding | NoSlipAiding]:
+    """What is known of the vehicle's motion."""
+    vehicle = options.vehicle
     candidates = standstill_candidates(main.t_ns, int(imu.t_ns[0]), int(imu.t_ns[-1]))
-    found = find_standstills(imu, main.fixes, candidates)
-    recorder.tell(int(imu.t_ns[0]), "info" if len(found.t_ns) else "warning", found.text)
-    return StandstillAiding(found.t_ns, options.zero_velocity_std, main.model)
+    found: list[StandstillAiding | NoSlipAiding] = []
+    stops = np.empty(0, np.int64)
+    if vehicle.zero_velocity:
+        standstill = find_standstills(imu, main.fixes, candidates)
+        recorder.tell(int(imu.t_ns[0]), "info" if len(standstill.t_ns) else "warning", standstill.text)
+        stops = _believed(standstill.t_ns, vehicle)
+        rates = stop_rates(imu, stops, options.imu_noise.gyro_noise) if vehicle.zero_rate else None
+        found.append(StandstillAiding(stops, vehicle.zero_velocity_std, main.model, rates, main.t_ns))
+    if vehicle.no_slip:
+        times = no_slip_times(np.setdiff1d(candidates, stops))
+        found.append(NoSlipAiding(imu, times, options.alignment.forward, vehicle, main.model))
+    return found
+
+
+def _believed(t_ns: Times, vehicle: VehicleOptions) -> Times:
+    """The times (e,) of standstill outside the stops that are doubted."""
+    for start_ns, end_ns in vehicle.doubted:
+        t_ns = t_ns[(t_ns < start_ns) | (t_ns > end_ns)]
+    return t_ns
 
 
 def _nothing_to_use(options: FilterOptions) -> LogError:

@@ -16,6 +16,7 @@ from navreplay.filters.consider import Setup, check_considers, set_up
 from navreplay.filters.epochs import output_times, run_epochs
 from navreplay.filters.presets import Method
 from navreplay.filters.rows import Rows, backward_agreement
+from navreplay.filters.second_look import contradiction, doubtful_stops, sit_in_vehicle
 from navreplay.filters.trace import Traces
 from navreplay.filters.trial import settle_attitude
 from navreplay.filters.update import Estimator
@@ -47,20 +48,50 @@ def run_filter(timeline: Timeline, method: Method, options: FilterOptions, progr
         def trace(told: FilterOptions, adapter: NoiseAdapter[Any], sources: tuple[str, ...]) -> tuple[LinearLog, ...]:
             """What a forward pass with these linearises."""
             traces, plain = Traces(sources), replace(told.consider, every_method=False)
-            # standstill has no noise to be found, and the IMU is quietest in it
-            moving = replace(told.vehicle, zero_velocity=False)
-            told = replace(told, output_rate=0.0, smooth=False, consider=plain, vehicle=moving)
+            # what a vehicle cannot do has no noise to be found, and the IMU is quietest at rest
+            told = replace(told, output_rate=0.0, smooth=False, consider=plain, vehicle=told.vehicle.free)
             _run_passes(timeline, replace(method, adapter=adapter), told, traces, next(shares))
             return traces.linear_logs()
 
         settled = method.calibration.settle(options, trace)
         progress = next(shares)
     method = replace(method, adapter=settled.adapter or method.adapter, calibration=None)
+    settled, placed = _placed(timeline, method, settled)
     solution = _run_passes(timeline, method, settled.options, None, progress)
     if method.review is not None:
         solution, settled = _reviewed(timeline, method, method.review, settled, solution, progress)
+    solution = _without_doubtful_stops(timeline, method, settled.options, solution, progress)
     told = tuple(Event(int(solution.t_ns[0]), "info", note) for note in settled.notes)
-    return replace(solution, estimated=settled.estimated, events=told + solution.events)
+    return replace(solution, estimated=settled.estimated, events=placed + told + solution.events)
+
+
+def _placed(timeline: Timeline, method: Method, settled: Settled) -> tuple[Settled, tuple[Event, ...]]:
+    """What was settled, with how the IMU sits in the vehicle where a constraint needs that and nobody tells it."""
+    options, vehicle = settled.options, settled.options.vehicle
+    if timeline.imu is None or not vehicle.no_slip or vehicle.mounting is not None:
+        return settled, ()
+    free = replace(options, output_rate=0.0, smooth=False, vehicle=replace(vehicle, no_slip=False))
+    solution = _run_passes(timeline, method, free, None)
+    placed, event = sit_in_vehicle(vehicle, solution, timeline.imu, options.alignment.forward)
+    return settled._replace(options=replace(options, vehicle=placed)), (event,)
+
+
+def _without_doubtful_stops(
+    timeline: Timeline, method: Method, options: FilterOptions, solution: Solution, progress: Progress | None
+) -> Solution:
+    """The solution, or one without the stops that the fixes behind them contradict, where they contradict that one less."""
+    stops = doubtful_stops(solution)
+    if not stops:
+        return solution
+    doubting = replace(options, vehicle=replace(options.vehicle, doubted=stops))
+    other = _run_passes(timeline, method, doubting, None, progress)
+    if not contradiction(other, stops) < contradiction(solution, stops):
+        return solution
+    text = (
+        f"{len(stops)} standstills in outages are not believed: the fixes behind them contradict the solution with them, and "
+        "less the one without"
+    )
+    return replace(other, events=(Event(stops[0][0], "warning", text), *other.events))
 
 
 def _reviewed(
@@ -140,10 +171,9 @@ def _choose_ranges_alone(timeline: Timeline, options: FilterOptions, recorder: R
         "its roll and pitch are unknown"
     )
     recorder.tell(int(timeline.ranges.t_ns[0]), "warning", text)
-    if options.vehicle.zero_velocity:
-        recorder.tell(
-            int(timeline.ranges.t_ns[0]), "warning", "vehicle.zero_velocity is not used: standstill is told by an IMU"
-        )
+    if options.vehicle.free != options.vehicle:
+        text = "vehicle.zero_velocity and what else is known of the vehicle are not used: without IMU nothing tells them"
+        recorder.tell(int(timeline.ranges.t_ns[0]), "warning", text)
     return RangeAiding(timeline.ranges, timeline.fix_lever_b, None, options, recorder)
 
 

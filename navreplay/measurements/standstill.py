@@ -110,9 +110,14 @@ def _speed(fixes: GnssFixSeries) -> Floats:
     otherwise of rest or motion."""
     told = np.hypot(fixes.vel_n[:, 0], fixes.vel_n[:, 1])
     speed = np.where(fixes.has_velocity, told, _position_speed(fixes))
-    around = _windows(speed)
+    rows = np.flatnonzero(np.isfinite(speed))
+    if not len(rows):
+        return speed
+    around = _windows(speed[rows])
     agree = (around < _AT_REST).all(axis=1) | (around > _IN_MOTION).all(axis=1)
-    return np.where(agree, speed, np.nan)
+    sure = np.full_like(speed, np.nan)
+    sure[rows[agree]] = speed[rows[agree]]
+    return sure
 
 
 def _position_speed(fixes: GnssFixSeries) -> Floats:

@@ -11,8 +11,8 @@ from navreplay.update.gaussian import Gaussian, Innovation
 
 __all__ = ["Adaptation", "NoiseAdapter", "adapt_measured", "is_measured"]
 
-_PSEUDO = "standstill"
-"""Kind of what no sensor has measured, and begin of its labels."""
+_PSEUDO = ("standstill", "zero_rate")
+"""Kinds of what no sensor has measured, and begin of their labels."""
 
 S = TypeVar("S")
 

@@ -19,6 +19,8 @@ _UNITS = {
     "attitude": "rad",
     "heading": "rad",
     "standstill": "m/s",
+    "zero_rate": "rad/s",
+    "no_slip": "m/s",
 }
 
 

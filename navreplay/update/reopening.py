@@ -25,10 +25,11 @@ _MEASURES: dict[str, tuple[str, ...]] = {
     "attitude": ("attitude_n", "attitude_e", "attitude_d"),
     "heading": ("attitude_d",),
     "standstill": _VELOCITY,
+    "zero_rate": ("gyro_bias_x", "gyro_bias_y", "gyro_bias_z"),
 }
 """By kind, how the names of the states begin that it measures."""
 
-_UNITS = {"position": "m", "range": "m", "velocity": "m/s", "range_rate": "m/s"}
+_UNITS = {"position": "m", "range": "m", "velocity": "m/s", "range_rate": "m/s", "standstill": "m/s", "zero_rate": "rad/s"}
 _WATCHED_NS = 90_000_000_000
 _MOST = 3
 

@@ -93,7 +93,7 @@ def _candidates(timeline: Timeline, config: Config, solution: Solution) -> Itera
         yield _Candidate(f"gnss.velocity_std_floor_mps={max(0.1, 3 * gnss.velocity_std_floor_mps):.3g}")
         yield _Candidate("filter.use_velocity=false")
     yield from (_Candidate(f"imu.grade={grade}") for grade in _neighbours(config.imu.grade))
-    if not config.vehicle.zero_velocity:
+    if not config.vehicle.options().zero_velocity:
         yield _Candidate("vehicle.zero_velocity=true")
     for shift in _OFFSETS_S:
         yield _Candidate(f"input.imu.time_offset_s={config.input.imu.time_offset_s + shift:+.3g}", shift)

@@ -222,7 +222,7 @@ def _cause(fault: Fault) -> str:
 
 def _plural(kind: str) -> str:
     words = kind.replace("_", " ")
-    return {"velocity": "velocities", "standstill": "standstill"}.get(words, f"{words}s")
+    return {"velocity": "velocities", "standstill": "standstill", "no slip": "no-slip constraints"}.get(words, f"{words}s")
 
 
 def _advice_lines(advice: Advice | None) -> list[str]:

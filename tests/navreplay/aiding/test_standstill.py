@@ -146,14 +146,18 @@ def test_without_an_imu_it_is_told_that_nothing_comes_of_it():
     drive = simulate(with_duration(SCENARIOS["ranges-open"], 30.0), 1)
     alone = Timeline(ranges=drive.ranges, fix_lever_b=drive.timeline().fix_lever_b)
     solution = run_filter(alone, build_method("fixed"), FilterOptions(vehicle=STANDING))
-    assert any("zero_velocity is not used" in event.text for event in solution.events)
+    assert any("are not used: without IMU" in event.text for event in solution.events)
 
 
 @pytest.mark.parametrize("name", [name for name in PRESETS if not name.endswith("-ga")])
-def test_every_method_takes_standstill_beside_fixes_as_it_is_told(log, name):
-    """Those with a genetic algorithm take minutes, with the update of ml and mlckf."""
+def test_every_method_takes_what_is_known_of_the_vehicle_beside_fixes(log, name):
+    """Standstill as it is told. Those with a genetic algorithm take minutes, with the update of ml and mlckf."""
     timeline = replace(log.timeline(), imu=shaken(log))
-    solution = run_filter(timeline, build_method(name), told_options(vehicle=STANDING, output_rate=1.0))
+    car = replace(STANDING, zero_rate=True, no_slip=True, mounting=(0.0, 0.0))
+    solution = run_filter(timeline, build_method(name), told_options(vehicle=car, output_rate=1.0))
+    used = {series.kind: series.used.mean() for series in solution.innovations}
+    assert used["zero_rate"] > 0.9
+    assert used["no_slip"] > 0.9
     standing = next(series for series in solution.innovations if series.kind == "standstill")
     assert standing.used.mean() > 0.9
     np.testing.assert_allclose(standing.noise_std, STANDING.zero_velocity_std, rtol=1e-12)
