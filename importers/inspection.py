@@ -1,7 +1,7 @@
 """What logs hold: channels with their rates, gaps and time bases, what each would be used as, and the findings about them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +20,7 @@ from importers.rows.log import Channel, Log, Table
 from importers.settings import AttitudeInput, FixInput, ImuInput, InputSettings, ReferenceInput
 from importers.vetting.vet import vet
 from navreplay.geodesy.time_scales import LeapSeconds, gps_from_utc
-from navreplay.timeline import LogError, SourceFile, Times
+from navreplay.timeline import LogError, SourceFile, Timeline, Times
 
 __all__ = ["ChannelInfo", "Inspection", "draft_mappings", "inspect_logs"]
 
@@ -98,11 +98,18 @@ def inspect_logs(
         findings.append(Finding("error", "unusable", f"{error}.", ""))
     else:
         assumptions = timeline.provenance.assumptions
+        channels = tuple(_as_used(channel, timeline) for channel in channels)
         timeline, vetted = vet(timeline)
         recognised = timeline.provenance.recognised
         findings += [finding for finding in (*vetted, *preflight(timeline)) if finding.code not in _implied(open_choices)]
     files = tuple(describe_file(log) for log in everything)
     return Inspection(files, channels, tuple(findings), open_choices, assumptions, recognised)
+
+
+def _as_used(channel: ChannelInfo, timeline: Timeline) -> ChannelInfo:
+    """The channel, as unused where reading it showed that it is of no use."""
+    uses = {use.role for use in timeline.provenance.channels if (use.file, use.name) == (channel.file, channel.name)}
+    return replace(channel, role="unused") if channel.role == "velocity" and uses == {"unused"} else channel
 
 
 def draft_mappings(paths: Sequence[str | Path], settings: InputSettings, inspection: Inspection) -> list[str]:

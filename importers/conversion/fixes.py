@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from importers.conversion.position_units import mend_angles
-from importers.conversion.velocity_frame import turn_velocities
+from importers.conversion.velocity_frame import is_of_a_vehicle, turn_velocities
 from importers.roles.sources import Joined, account
 from importers.rows.screening import Screening
 from importers.rows.tables import NO_FIX, Frame, Rows
@@ -130,11 +130,13 @@ def _build(
         )
         frame = rows.vel_frame if settings.velocity_frame == "auto" or rows.vel_frame != "auto" else settings.velocity_frame
         cov = None if rows.cov_vel is None else rows.cov_vel[order]
-        turned = turn_velocities(joined.name, t_ns, rows.vel[order], cov, frame, *path)
+        own = frame == "auto" and is_of_a_vehicle(rows.vel[order])
+        turned = None if own else turn_velocities(joined.name, t_ns, rows.vel[order], cov, frame, *path)
         if turned is None:
+            why = _COMMANDED if own else _FOREIGN
             if settings.velocity_channel is not None:
-                raise LogError(f"{joined.name}: {_FOREIGN}; set input.fix.velocity_frame, or leave the channel out")
-            return None, (f"{joined.name}: {_FOREIGN}, so it is not used",), None
+                raise LogError(f"{joined.name}: {why}; set input.fix.velocity_frame, or leave the channel out")
+            return None, (f"{joined.name}: {why}, so it is not used",), None
         vel, cov_vel, found, told = turned
         notes += told
     cov_vel, told = clean_covariance(f"{joined.name} velocity", cov_vel, n)
@@ -142,6 +144,7 @@ def _build(
     return (GnssFixSeries(t_ns, lla, vel, cov_pos, cov_vel, status) if n else None), (*notes, *told), found
 
 
+_COMMANDED = "one of the horizontal parts of its velocity is exactly 0 while the other moves, as of wheels or of a command"
 _FOREIGN = "its velocities agree with the motion of the fixes in neither ENU nor NED (a vehicle-frame velocity?)"
 
 

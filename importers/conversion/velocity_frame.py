@@ -6,12 +6,20 @@ from importers.rows.tables import Frame
 from navreplay.geodesy.earth import ecef_from_lla, lla_from_ecef, matrix_en
 from navreplay.timeline import Floats, Times
 
-__all__ = ["interpolate_lla", "turn_velocities"]
+__all__ = ["interpolate_lla", "is_of_a_vehicle", "turn_velocities"]
 
 _SPAN_NS = 10**9
 _LEAST_SPEED = 0.5
+_LEAST_MOVING = 20
 _AGREEMENT = 0.5
 _NED_OF_ENU = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+
+
+def is_of_a_vehicle(vel: Floats) -> bool:
+    """Whether velocities (n, 3) have one horizontal part that is exactly 0 while the other moves: those of wheels or commanded
+    ones, along a vehicle's own axes. A receiver's are never that, whatever the way it is driven."""
+    moving = np.isfinite(vel).all(axis=1) & (np.abs(vel[:, :2]).max(axis=1) > _LEAST_SPEED)
+    return bool(moving.sum() >= _LEAST_MOVING and (vel[moving, :2] == 0).all(axis=0).any())
 
 
 def interpolate_lla(t_ns: Times, path_t_ns: Times, path_lla: Floats) -> Floats:

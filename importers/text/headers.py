@@ -12,6 +12,7 @@ import tomlkit
 
 from importers.rows.field_names import Guess, guess_angle_unit, guess_counter, guess_quantities, guess_time, unit_in
 from importers.settings import CsvMapping
+from importers.text.headerless import understand
 from importers.text.table import TextTable, head_cells, number_of_lettered, parse_text
 from navreplay.timeline import Floats, LogError
 
@@ -51,8 +52,10 @@ def draft_table(path: str, head: bytes) -> TableDraft | None:
         return None
     text = head.decode("utf-16" if head[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig", errors="replace")
     table = parse_text(text.rpartition("\n")[0].encode())
-    if not table.names or len(table.frame) == 0:
+    if len(table.frame) == 0:
         return None
+    if not table.names:
+        return _draft_headerless(path, table)
     fields = _numbers(table)
     guesses = guess_quantities(fields)
     roles = [(role, needed) for role, needed in _ROLES if guesses.keys() >= needed]
@@ -71,6 +74,17 @@ def draft_table(path: str, head: bytes) -> TableDraft | None:
         values["columns"] |= _hemispheres(table) if values["role"] == "fix" else {}
     mappings = tuple(CsvMapping.model_validate(values) for values, _ in drafts)
     return TableDraft(mappings, tuple(line for values, reasons in drafts for line in _toml(values, reasons)))
+
+
+def _draft_headerless(path: str, table: TextTable) -> TableDraft | None:
+    """A mapping for a table without names, by its values."""
+    frame = table.frame
+    meaning = understand({i + 1: frame[i].to_numpy(dtype=np.float64) for i in frame if frame[i].dtype.kind in "fiu"})
+    if meaning is None:
+        return None
+    values = {"match": _literal(Path(path).name), "role": meaning.role, "time": dict(meaning.time)}
+    values |= {"columns": dict(meaning.columns), "units": dict(meaning.units)}
+    return TableDraft((CsvMapping.model_validate(values),), tuple(_toml(values, meaning.reasons)))
 
 
 def _hemispheres(table: TextTable) -> dict[str, str]:
@@ -187,7 +201,7 @@ def _literal(name: str) -> str:
 
 
 def _toml(values: Mapping[str, Any], reasons: Mapping[str, str]) -> list[str]:
-    lines = ["", "[[input.csv]] # drafted from the header and the first rows: check it"]
+    lines = ["", "[[input.csv]] # drafted from the first rows: check it"]
     for key, value in values.items():
         if not isinstance(value, dict):
             lines.append(_line(key, value, reasons.get(key)))

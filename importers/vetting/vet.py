@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from importers.findings import Finding
 from importers.vetting.axes import turn_upright
+from importers.vetting.heights import heights_in_metres
 from importers.vetting.jumps import leave_out_jumps
 from importers.vetting.repeats import leave_out_repeats
 from importers.vetting.velocities import vet_velocities
@@ -30,7 +31,7 @@ def vet(timeline: Timeline) -> tuple[Timeline, tuple[Finding, ...]]:
     unrolled = unroll_weeks(fixes, timeline.imu)
     fixes, findings = unrolled.fixes, [*upright, *unrolled.findings]
     channels = timeline.provenance.channels
-    for step in (leave_out_repeats, vet_velocities, leave_out_jumps):
+    for step in (leave_out_repeats, heights_in_metres, vet_velocities, leave_out_jumps):
         vetted = step(fixes)
         channels = _account(channels, vetted)
         fixes = vetted.fixes
