@@ -30,8 +30,8 @@ def heights_in_metres(fixes: GnssFixSeries) -> Vetted:
     if not level or steep.left > _FITS or abs(steep.scale / _FOOT - 1) > _NEAR:
         return Vetted(fixes)
     text = (
-        f"The heights change {1 / steep.scale:.2f} times as much as the vertical velocity says, while the horizontal motion fits: "
-        f"they are in feet (the first is {fixes.lla[np.flatnonzero(fixes.has_position)[0], 2]:.1f})."
+        f"The heights change {1 / steep.scale:.2f} times as much as the vertical velocity says, while the horizontal motion "
+        f"fits: they are in feet (the first is {fixes.lla[np.flatnonzero(fixes.has_position)[0], 2]:.1f})."
     )
     finding = Finding("warning", "heights-in-feet", text, "They are taken so; convert them where the log is made or mapped.")
     return Vetted(replace(fixes, lla=fixes.lla * [1.0, 1.0, _FOOT]), (finding,))
