@@ -9,6 +9,7 @@ from importers.containers.file_bytes import is_bag_folder
 from importers.containers.packed import packing_of, unpack_file
 from importers.containers.remote import address_of, fetch
 from importers.containers.stand_in import Scratch, StandIn, told_as
+from importers.drafting.headers import draft_matrices, draft_table
 from importers.meanings.mapped_log import MappedLog
 from importers.nmea.fixes import read_nmea
 from importers.nmea.sentences import is_nmea
@@ -30,9 +31,9 @@ from importers.streams import (
 from importers.text.csv_layouts import find_layout, read_layout
 from importers.text.csv_mapping import find_mappings, read_mapped
 from importers.text.csv_ranges import OWN_RANGES
-from importers.text.headers import draft_table
 from importers.text.kf_gins import find_kf_gins, read_gnss, read_imu
 from importers.text.log import TableLog, TextLog
+from importers.text.matrices import is_matlab, read_matrices
 from importers.text.rtklib_pos import is_pos, read_pos
 from importers.text.smartphone import is_smartphone, read_smartphone
 from importers.text.tum import is_tum, read_tum
@@ -209,7 +210,13 @@ def _open_mapped(path: str, head: bytes, settings: InputSettings) -> Log | None:
 
 
 def _open_table(path: str, head: bytes, settings: InputSettings) -> Log | None:
-    draft = draft_table(path, head)
+    draft = draft_matrices(path) if is_matlab(head) else draft_table(path, head)
+    if draft is None and is_matlab(head):
+        there = ", ".join(f"{name} {value.shape[0]} x {value.shape[1]}" for name, value in read_matrices(path).items())
+        raise LogError(
+            f"{path}: a MATLAB file whose matrices ({there or 'none of numbers'}) are not plain by their values; describe one "
+            "with an [[input.csv]] that names it with variable, and its columns by their numbers"
+        )
     return None if draft is None else _table(path, draft.mappings, settings, draft.lines)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from importers.roles.heights import fill_unknown_heights
 from importers.roles.messages import kind_of, stamp_column
-from importers.rows.clock import gps_from_stamps
+from importers.rows.clock import LONGEST_ON_NS, NOMINAL_NS, gps_from_stamps
 from importers.rows.log import Channel, Table
 from importers.rows.message_fields import either_spelling
 from importers.rows.screening import Screening
@@ -23,9 +23,6 @@ __all__ = ["Clock", "Joined", "Source", "account", "join_sources"]
 _EARLIEST_UNIX_NS = 631_152_000 * 10**9
 _MOST_DELAY_NS = 5e9
 _RESTART_NS = 10**9
-_LONGEST_ON_NS = 10 * 365 * 86_400 * 10**9
-_NOMINAL_NS = 2087 * 604_800 * 10**9
-"""A day that stands for the unknown one, in GPS time."""
 _WITHOUT_ORIENTATION = frozenset({"imu", "accel"})
 """Roles that an orientation beside the rates serves nothing; of a long log it would be the larger part."""
 
@@ -190,12 +187,12 @@ def _times(
 def _dated(channel: Channel, t_ns: Times, notes: list[str]) -> Times:
     """Times of a table that count from power-on, on a day of their own, the same for all such tables: sensors of one clock
     agree though nobody knows the date."""
-    if not channel.type.startswith("csv/") or len(t_ns) == 0 or not 0 <= t_ns.min() <= t_ns.max() < _LONGEST_ON_NS:
+    if not channel.type.startswith("csv/") or len(t_ns) == 0 or not 0 <= t_ns.min() <= t_ns.max() < LONGEST_ON_NS:
         return t_ns
     notes.append(
         f"{channel.name}: its times count from power-on; they are told as if that had been at 2020-01-05 00:00 GPS time"
     )
-    return t_ns + _NOMINAL_NS
+    return t_ns + NOMINAL_NS
 
 
 def _counts_from_power_on(stamps: Times, table: Table) -> bool:

@@ -14,8 +14,23 @@ from navreplay.geodesy.time_scales import (
 )
 from navreplay.timeline import LogError, Times
 
-__all__ = ["count_ns", "gps_from_gps_unix", "gps_from_stamps", "is_time", "leap_seconds", "unwrap_weeks"]
+__all__ = [
+    "LONGEST_ON_NS",
+    "NOMINAL_NS",
+    "count_ns",
+    "gps_from_gps_unix",
+    "gps_from_stamps",
+    "is_nominal",
+    "is_time",
+    "leap_seconds",
+    "unwrap_weeks",
+]
 
+LONGEST_ON_NS = 4 * 365 * 86_400 * 10**9
+"""What a count from power-on stays below."""
+NOMINAL_NS = 2087 * 604_800 * 10**9
+"""A day that stands for the unknown one of such a count, 2020-01-05, in GPS time."""
+_LONGEST_COUNT_NS = 50 * 86_400 * 10**9
 _UNIT_NS = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
 _HALF_WEEK_S = 302_400
 _CENTURY_S = 3_200_000_000
@@ -50,6 +65,11 @@ def unwrap_weeks(gps_week: int | None, tow_s: np.ndarray, place: str) -> np.ndar
     if len(tow_s) == 0:
         return np.empty(0, dtype=np.int64)
     return np.asarray(gps_week + np.concatenate([[0], np.cumsum(np.diff(tow_s) < -_HALF_WEEK_S)]), dtype=np.int64)
+
+
+def is_nominal(t_ns: Times) -> bool:
+    """Whether times (n,) may be counts from power-on told on their nominal day: within the 50 days of a 32-bit millisecond."""
+    return len(t_ns) > 0 and bool(t_ns[0] >= NOMINAL_NS and t_ns[-1] < NOMINAL_NS + _LONGEST_COUNT_NS)
 
 
 def gps_from_gps_unix(count: Times) -> Times:

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,10 +18,13 @@ class Guess:
     path: str
     unit: str
     reason: str
+    backwards: bool = False
+    """Whether the name says that it points against its axis (up of down, left of right)."""
 
 
 _UNIT_ENDS = {
     "deg": "deg", "rad": "rad", "e7": "1e-7 deg", "degps": "deg/s", "dps": "deg/s", "radps": "rad/s", "rads": "rad/s",
+    "rps": "rad/s",
     "mps": "m/s", "ms": "m/s", "cmps": "cm/s", "mmps": "mm/s", "kmh": "km/h", "kmph": "km/h", "kn": "kn", "knots": "kn",
     "mph": "mph", "mps2": "m/s2", "ms2": "m/s2", "mg": "mg", "m": "m", "cm": "cm", "mm": "mm", "ft": "ft",
 }  # fmt: skip
@@ -84,6 +87,11 @@ _SCALARS = {
         ("accel", r"acc|accel|acceleration|accelerometer|a|f|linearacceleration|linacc|specificforce"),
     )
 }  # fmt: skip
+_DIRECTIONS = {"x": r"(fwd|forward|front)|(back|backward|rear)", "y": r"(right|rgt)|(left)", "z": r"(down|dn)|(up)"}
+_SENSORS = {
+    "gyro": r"(?:gyro|gyroscope|gyr|w|omega|rate|angvel|angularrate|angularvelocity)",
+    "accel": r"(?:acc|accel|acceleration|a|f|force|specificforce)",
+}
 _VECTORS = {
     "gyro": r"gyro|gyroscope|gyr|omega|rates?|angvel|angularrates?|angularvelocity|angularvel|angrate",
     "accel": r"acc|accel|acceleration|accelerometer|linearacceleration|linacc|specificforce",
@@ -101,7 +109,7 @@ _FAMILY = {
 _DEFAULT = {"angle": "deg", "rate": "rad/s", "force": "m/s2", "speed": "m/s"}
 _TIME = re.compile(r".*(time|stamp|tow|utc|unix|epoch|clock).*|t(ns|us|ms|s)?")
 _COUNTER = re.compile(r".*(time|stamp|uptime|micros|millis|nanos|ticks|elapsed|clock).*|t(ns|us|ms|s)?|us|ms|ns|sec(onds?)?")
-_COUNTER_UNITS = {"micros": "us", "millis": "ms", "nanos": "ns", "us": "us", "ms": "ms", "ns": "ns"}
+_COUNTER_UNITS = {"micros": "us", "millis": "ms", "nanos": "ns", "us": "us", "ms": "ms", "ns": "ns", "s": "s", "sec": "s"}
 
 
 def guess_angle_unit(lat: Floats, lon: Floats) -> tuple[str, str]:
@@ -134,7 +142,23 @@ def guess_quantities(fields: Mapping[str, Floats]) -> dict[str, Guess]:
         if quantity is not None:
             told = unit or _unit_of(quantity, values)
             found.setdefault(quantity, Guess(path, told, _reason(path, values, told)))
+            continue
+        along = _direction(names)
+        if along is not None:
+            told = unit or _unit_of(along[0], values)
+            found.setdefault(along[0], Guess(path, told, _reason(path, values, told), along[1]))
     return _with_family_units(found, fields)
+
+
+def _direction(names: list[str]) -> tuple[str, bool] | None:
+    """The axis of a sensor that a name tells by its direction in the vehicle, and whether it is the opposite one."""
+    for name in names:
+        for kind, sensor in _SENSORS.items():
+            for axis, ways in _DIRECTIONS.items():
+                match = re.fullmatch(f"{sensor}(?:{ways})", name)
+                if match is not None:
+                    return f"{kind}_{axis}", match.group(2) is not None
+    return None
 
 
 def _match(patterns: Mapping[str, str], names: list[str]) -> str | None:
@@ -188,7 +212,7 @@ def _with_family_units(found: dict[str, Guess], fields: Mapping[str, Floats]) ->
             whole = np.column_stack([fields[found[axis].path] for axis in axes])
             if not any(_names_and_unit(found[axis].path)[1] for axis in axes):
                 unit = _unit_of(axes[0], whole)
-                found |= {axis: Guess(found[axis].path, unit, _reason(found[axis].path, whole, unit)) for axis in axes}
+                found |= {axis: replace(found[axis], unit=unit, reason=_reason(found[axis].path, whole, unit)) for axis in axes}
     return found
 
 
@@ -219,12 +243,14 @@ def guess_counter(fields: Mapping[str, Floats]) -> tuple[str, str, str, str] | N
     but for turns of its 32 bits."""
     for path, values in fields.items():
         plain = path.replace("_", "").lower().rpartition(".")[2]
-        if values.ndim != 1 or not _COUNTER.fullmatch(re.sub(r"[^a-z]", "", plain)) or len(values) < 2:
+        first = re.split(r"[^a-z]", path.lower())[0]
+        named = _COUNTER.fullmatch(re.sub(r"[^a-z]", "", plain)) or first in ("t", "time")
+        if values.ndim != 1 or not named or len(values) < 2:
             continue
         steps = np.diff(values)
         grows = (steps >= 0) | (steps < -(2.0**31))
         if np.isfinite(values).all() and (values >= 0).all() and grows.all() and (steps > 0).any():
-            named = next((unit for word, unit in _COUNTER_UNITS.items() if plain.endswith(word)), unit_in(path))
-            unit = named if named in ("s", "ms", "us", "ns") else "auto"
+            words = re.findall(r"[a-z]+", re.sub(r"(?<=[a-z])(?=[A-Z])", "_", path).lower())
+            unit = _COUNTER_UNITS.get(words[-1], "auto")
             return path, unit, "boot", f"it grows from {values[0]:.9g}: a count from power-on"
     return None

@@ -12,6 +12,7 @@ from importers.rows.tables import NO_FIX, diagonal_covariance, drop_absurd, stat
 from importers.settings import Column, CsvMapping, CsvTime
 from importers.text.csv_ranges import range_columns
 from importers.text.csv_units import in_si
+from importers.text.matrices import read_matrices
 from importers.text.table import Selection, TextTable, head_cells, parse_text, read_bytes, select_columns
 from importers.text.times import check_rounding, read_counts, read_dates, unroll_32_bits
 from navreplay.geodesy.earth import lla_from_ecef
@@ -151,17 +152,12 @@ def _read_lines(path: str, mapping: CsvMapping) -> TextTable:
 
 def _read_matrix(path: str, mapping: CsvMapping) -> TextTable:
     import pandas as pd
-    from scipy.io import loadmat  # here, because few logs are MATLAB files and it takes a while to import
-    from scipy.io.matlab import MatReadError
 
-    try:
-        variables = loadmat(path)
-    except (OSError, ValueError, MatReadError, NotImplementedError) as error:
-        raise LogError(f"{path}: cannot be read as a MATLAB file (version 7 or older): {error}") from error
-    matrix = variables.get(mapping.variable)
-    if not isinstance(matrix, np.ndarray) or matrix.ndim != 2 or matrix.dtype.kind not in "fiu":
-        names = ", ".join(name for name in variables if not name.startswith("__"))
-        raise LogError(f"{path}: has no numeric matrix {mapping.variable}; its variables are {names}")
+    matrices = read_matrices(path)
+    matrix = matrices.get(mapping.variable or "")
+    if matrix is None:
+        there = ", ".join(matrices) or "none"
+        raise LogError(f"{path}: has no numeric matrix {mapping.variable}; its numeric matrices are {there}")
     return TextTable((), pd.DataFrame(matrix), len(matrix), {})
 
 

@@ -8,6 +8,7 @@ from importers.vetting.axes import turn_upright
 from importers.vetting.heights import heights_in_metres
 from importers.vetting.jumps import leave_out_jumps
 from importers.vetting.repeats import leave_out_repeats
+from importers.vetting.undated import set_to_fixes
 from importers.vetting.velocities import vet_velocities
 from importers.vetting.vetted import Vetted
 from importers.vetting.weeks import unroll_weeks
@@ -24,7 +25,9 @@ def vet(timeline: Timeline) -> tuple[Timeline, tuple[Finding, ...]]:
 
     The reference is never touched. In the accounting of channels a row that is left out whole is rejected, with the reason.
     """
+    timeline, dated = _dated(timeline)
     timeline, upright = _upright(timeline)
+    upright = (*dated, *upright)
     fixes = timeline.fixes
     if fixes is None:
         return timeline, upright
@@ -39,6 +42,14 @@ def vet(timeline: Timeline) -> tuple[Timeline, tuple[Finding, ...]]:
     if not findings:
         return timeline, ()
     return replace(timeline, fixes=fixes, provenance=replace(timeline.provenance, channels=channels)), tuple(findings)
+
+
+def _dated(timeline: Timeline) -> tuple[Timeline, tuple[Finding, ...]]:
+    """The timeline with an IMU that counts from power-on set to the time of the fixes, where their turns tell it."""
+    if timeline.imu is None or timeline.fixes is None:
+        return timeline, ()
+    found = set_to_fixes(timeline.imu, timeline.fixes)
+    return (timeline, ()) if found is None else (replace(timeline, imu=found[0]), (found[1],))
 
 
 def _upright(timeline: Timeline) -> tuple[Timeline, tuple[Finding, ...]]:

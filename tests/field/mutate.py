@@ -8,8 +8,10 @@ processes, so that a crash ends one of these only.
 
 import argparse
 import contextlib
+import importlib
 import io
 import os
+import pkgutil
 import resource
 import signal
 import sys
@@ -22,6 +24,9 @@ from types import FrameType
 
 import numpy as np
 
+import importers
+import navreplay
+import pipelines
 from pipelines import cli
 from tests.field.sound_files import SETS, make
 
@@ -144,6 +149,14 @@ def _try_batch(seed: int, numbers: range, names: list[str], sound: Path, progres
     return len(tried)
 
 
+def _load_everything() -> None:
+    """The modules that commands import when they are first needed, so that all cases run the same program."""
+    for package in (importers, navreplay, pipelines):
+        for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+            if not module.name.endswith("__main__"):
+                importlib.import_module(module.name)
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Prints what went wrong and how much was tried; the exit code tells whether nothing went wrong."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -153,6 +166,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--seconds", type=float, default=np.inf, help="end after this time")
     parser.add_argument("words", nargs="*", help="parts of the names of sets, instead of all")
     chosen = parser.parse_args(arguments)
+    _load_everything()
     names = [name for name in SETS if not chosen.words or any(word in name for word in chosen.words)]
     begin, tried, wrong = time.monotonic(), 0, 0
     with tempfile.TemporaryDirectory() as folder:

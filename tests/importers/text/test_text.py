@@ -283,7 +283,7 @@ def test_mapping_of_a_matlab_matrix_and_of_earth_fixed_velocities(tmp_path):
     np.testing.assert_allclose(fixes.lla[0], lla, rtol=1e-12)
     np.testing.assert_allclose(fixes.vel_n, np.tile(vel_n, (20, 1)), atol=1e-3)
     positions["variable"] = "Q"
-    with pytest.raises(LogError, match="has no numeric matrix Q; its variables are P, other"):
+    with pytest.raises(LogError, match="has no numeric matrix Q; its numeric matrices are P"):
         load_timeline([tmp_path / "data.mat"], InputSettings.model_validate(settings))
 
 

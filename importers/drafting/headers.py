@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 import tomlkit
 
+from importers.drafting.headerless import understand
 from importers.rows.field_names import Guess, guess_angle_unit, guess_counter, guess_quantities, guess_time, unit_in
 from importers.settings import CsvMapping
-from importers.text.headerless import understand
+from importers.text.matrices import read_matrices
 from importers.text.table import TextTable, head_cells, number_of_lettered, parse_text
 from navreplay.timeline import Floats, LogError
 
-__all__ = ["TableDraft", "draft_table"]
+__all__ = ["TableDraft", "draft_matrices", "draft_table"]
 
 _ROLES: tuple[tuple[str, frozenset[str]], ...] = (
     ("imu", frozenset(f"{kind}_{axis}" for kind in ("gyro", "accel") for axis in "xyz")),
@@ -29,6 +30,7 @@ _DATED = re.compile(
 _CLOCK = re.compile(r"\s*\d{1,2}:\d\d:\d\d(?:[.,]\d*)?\s*(Z|UTC|[AaPp]\.?[Mm]\.?)?\s*")
 _TIMES_OF_DAY = re.compile(r".*(time|utc|clock).*")
 _HEAD_ROWS = 20
+_ABSURD = 1e19
 _PLACES = re.compile(r".*(lat|lon|lng).*", re.IGNORECASE)
 _HEMISPHERES = {
     "ns": re.compile(r"n/?s|(lat(itude)?)(dir(ection)?|ref|hemi(sphere)?|ns)|(ns|n/?s)(ind(icator)?|hemi(sphere)?)"),
@@ -79,10 +81,29 @@ def draft_table(path: str, head: bytes) -> TableDraft | None:
 def _draft_headerless(path: str, table: TextTable) -> TableDraft | None:
     """A mapping for a table without names, by its values."""
     frame = table.frame
-    meaning = understand({i + 1: frame[i].to_numpy(dtype=np.float64) for i in frame if frame[i].dtype.kind in "fiu"})
+    return _draft_by_value(path, {i + 1: frame[i].to_numpy(dtype=np.float64) for i in frame if frame[i].dtype.kind in "fiu"})
+
+
+def draft_matrices(path: str) -> TableDraft | None:
+    """Mappings for the matrices of a MATLAB file whose columns are plain by value, one for each role. Raises LogError where the
+    file cannot be read."""
+    drafts = {}
+    for name, matrix in read_matrices(path).items():
+        draft = _draft_by_value(path, dict(enumerate(matrix.T.astype(np.float64), 1)), name)
+        if draft is not None:
+            drafts.setdefault(draft.mappings[0].role, draft)
+    found = tuple(drafts.values())
+    lines = tuple(line for draft in found for line in draft.lines)
+    return TableDraft(tuple(draft.mappings[0] for draft in found), lines) if found else None
+
+
+def _draft_by_value(path: str, columns: Mapping[int, Floats], variable: str | None = None) -> TableDraft | None:
+    """A mapping for the columns (n,) of a table without names, by their numbers."""
+    meaning = understand({i: np.where(np.abs(values) < _ABSURD, values, np.nan) for i, values in columns.items()})
     if meaning is None:
         return None
-    values = {"match": _literal(Path(path).name), "role": meaning.role, "time": dict(meaning.time)}
+    values = {"match": _literal(Path(path).name), "role": meaning.role} | ({"variable": variable} if variable else {})
+    values |= {"time": dict(meaning.time)}
     values |= {"columns": dict(meaning.columns), "units": dict(meaning.units)}
     return TableDraft((CsvMapping.model_validate(values),), tuple(_toml(values, meaning.reasons)))
 
@@ -112,7 +133,8 @@ def _numbers(table: TextTable) -> dict[str, Floats]:
         if column.dtype.kind not in "fiu" and _PLACES.fullmatch(name):
             column = pd.to_numeric(number_of_lettered(column), errors="coerce")
         if column.dtype.kind in "fiu" and column.notna().any() and name not in fields:
-            fields[name] = column.to_numpy(dtype=np.float64)
+            values = column.to_numpy(dtype=np.float64)
+            fields[name] = np.where(np.abs(values) < _ABSURD, values, np.nan)
     return fields
 
 
@@ -182,6 +204,9 @@ def _mapping(
     values["units"] = {
         name: unit for name, unit in units.items() if unit != _NOT_SI.get(name.partition("_")[0]) or role == "imu"
     }
+    if any(guesses[name].backwards for name in wanted):
+        signed = {name: guesses[name].unit for name in wanted if name.startswith(("gyro", "accel"))}
+        values["units"] |= {name: f"-1 {unit}" if guesses[name].backwards else unit for name, unit in signed.items()}
     reasons = {"time": time[1], "role": f"its header has {', '.join(guesses[name].path for name in sorted(needed))}"}
     if role == "fix":
         guessed, why = guess_angle_unit(*(fields[guesses[name].path] for name in ("lat", "lon")))

@@ -41,10 +41,10 @@ def understand(columns: Mapping[int, Floats]) -> Meaning | None:
     if not columns or len(next(iter(columns.values()))) < _LEAST_ROWS:
         return None
     grows = [number for number, values in columns.items() if _grows(values)]
-    if len(grows) != 1:
+    if not grows:
         return None
     time, reason = _time(grows[0], columns[grows[0]])
-    others = [number for number in columns if number != grows[0]]
+    others = [number for number in columns if number not in grows]
     triples = [triple for triple in zip(others, others[1:], others[2:], strict=False) if triple[2] - triple[0] == 2]
     for triple in triples:
         values = np.column_stack([columns[number] for number in triple])
