@@ -1,6 +1,6 @@
 """A stranger's first steps on real drives: inspect, init, run, nothing else; the raw fixes' error beside the solution's.
 
-    python benchmarks/first_steps.py --drive NAME LOG ... [--reference FILE] [--drive NAME LOG ...]
+    python benchmarks/first_steps.py --drive NAME LOG ... [--reference FILE] [--set KEY=VALUE] [--drive NAME LOG ...]
 
 Errors are horizontal, RMS, outside outages, against the reference, as the verdict of `run` tells them. Where a step ends with
 an error its line is shown in place of figures.
@@ -26,6 +26,8 @@ def parse(arguments: list[str]) -> list[tuple[str, list[str], str | None]]:
         elif word == "--reference":
             name, logs, _ = drives.pop()
             drives.append((name, logs, str(Path(next(words)).resolve())))
+        elif word == "--set":
+            drives[-1][1].extend((word, next(words)))
         else:
             drives[-1][1].append(str(Path(word).resolve()))
     return drives
@@ -52,8 +54,8 @@ def steps(logs: list[str], reference: str | None, folder: Path) -> str:
     if code:
         return f"{error}"
     verdict = json.loads((out / "report.json").read_text())["verdict"]
-    against = verdict.get("against_reference") or {}
-    figures = [f"{against[key]:.2f}" if against.get(key) is not None else "-" for key in ("fixes_m", "solution_m")]
+    against = verdict.get("beside_reference") or {}
+    figures = [f"{against[key]:.2f}" if against.get(key) is not None else "-" for key in ("fixes_rms_m", "solution_rms_m")]
     return f"{figures[0]} | {figures[1]} | {verdict['grade']}"
 
 

@@ -10,6 +10,7 @@ from importers.drivers.packages import meanings_of
 from importers.meanings.esf_messages import ESF_NOTE, esf_samples
 from importers.meanings.mapped_messages import fits_fields, map_table
 from importers.meanings.nmea_messages import sentence_fixes
+from importers.meanings.novatel_release import check_release
 from importers.message_settings import MessageMapping, MessageTime
 from importers.rows.log import Channel, Log, Table
 from navreplay.geodesy.time_scales import LeapSeconds
@@ -114,6 +115,8 @@ class MappedLog:
             conversion = CONVERTED.get(type)
             return table if conversion is None else conversion[0](table, self._leap)
         channel, variants, told = self._mapped[name]
+        if channel.type.startswith("novatel_") and not told:
+            check_release(table.columns, channel.type)
         joined = _joined(table, beside, variants[0].key)
         mapping = next((variant for variant in variants if fits_fields(joined, variant)), variants[0])
         source = "the mapping [[input.message]]" if told else f"what is known of {channel.type}"

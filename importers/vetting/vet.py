@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from importers.findings import Finding
+from importers.vetting.accuracy import check_told_accuracy
 from importers.vetting.axes import turn_upright
 from importers.vetting.heights import heights_in_metres
 from importers.vetting.jumps import leave_out_jumps
@@ -39,6 +40,7 @@ def vet(timeline: Timeline) -> tuple[Timeline, tuple[Finding, ...]]:
         channels = _account(channels, vetted)
         fixes = vetted.fixes
         findings += vetted.findings
+    findings += check_told_accuracy(fixes)
     if not findings:
         return timeline, ()
     return replace(timeline, fixes=fixes, provenance=replace(timeline.provenance, channels=channels)), tuple(findings)

@@ -127,7 +127,7 @@ def square_millimetres(log: SyntheticLog, folder: Path) -> list[str]:
     return ["log.mcap"]
 
 
-@kind("town-rtk", said=("deviation",))
+@kind("town-rtk", said=("hold standard deviations",))
 def deviations_in_the_covariance(log: SyntheticLog, folder: Path) -> list[str]:
     """Standard deviations where variances belong: 0.015 for 1.5 cm"""
     write_ros(folder / "log.mcap", _imu(log) + _fixes(log, _lla(log), (0.015, 0.015, 0.03)))

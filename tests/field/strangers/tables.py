@@ -124,7 +124,7 @@ def american_am_pm(log: SyntheticLog, folder: Path) -> list[str]:
     return [_imu_table(log, folder / "imu.csv"), "track.csv"]
 
 
-@kind("town-rtk")
+@kind("town-rtk", said=("hold variances",))
 def variances_named_std(log: SyntheticLog, folder: Path) -> list[str]:
     """A table whose std columns hold variances: 2e-4 for 1.5 cm"""
     lat, lon, height = _degrees(log)
