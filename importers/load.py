@@ -12,6 +12,7 @@ from importers.conversion.imu import convert_imu
 from importers.conversion.imu_pair import join_accelerations
 from importers.conversion.ranges import convert_ranges
 from importers.conversion.reference import convert_reference, reference_from_fixes
+from importers.conversion.speeds import convert_speed
 from importers.formats import open_log
 from importers.meanings.mapped_log import unused_mappings
 from importers.roles.selection import Choice, choose_channels, named_channel
@@ -69,7 +70,7 @@ def build_timeline(
     uses: list[ChannelUse] = [_time_use(source) for source in sources.get("time", [])]
     notes: list[str] = []
     recognised: dict[str, str] = {}
-    imu = fixes = ranges = attitude = trajectory = None
+    imu = fixes = ranges = attitude = trajectory = speed = None
     if "imu" in sources:
         joined = join_sources(sources["imu"], settings.imu, clock)
         if "accel" in sources:
@@ -90,6 +91,9 @@ def build_timeline(
             join_sources(sources["attitude"], settings.attitude, clock), settings.attitude
         )
         uses, notes = [*uses, *told], [*notes, *assumed]
+    if "speed" in sources:
+        speed, told, assumed = convert_speed(join_sources(sources["speed"], settings.speed, clock), settings.speed)
+        uses, notes = [*uses, *told], [*notes, *assumed]
     if "reference" in sources:
         trajectory, told, assumed = _reference(sources["reference"], settings, clock, unreadable)
         uses, notes = [*uses, *told], [*notes, *assumed]
@@ -109,6 +113,7 @@ def build_timeline(
         ranges=ranges,
         attitude=attitude,
         reference=trajectory,
+        speed=speed,
         fix_lever_b=np.array(settings.fix.lever_arm_m),
         reference_lever_b=_reference_lever(settings),
         provenance=provenance,

@@ -69,6 +69,12 @@ Quantity = Literal[
     "std_att_y",
     "std_att_z",
     "speed",
+    "speed_left",
+    "speed_right",
+    "turn_rate",
+    "ticks",
+    "ticks_left",
+    "ticks_right",
     "course",
     "std_h",
     "std_vel",
@@ -94,7 +100,9 @@ Quantity = Literal[
     "ionosphere_m",
     "troposphere_m",
 ]
-"""What a column of a text file can hold. ``speed`` and ``course`` (clockwise from north) are over ground; ``std_h`` stands for
+"""What a column of a text file can hold. ``speed`` and ``course`` (clockwise from north) are over ground; of the role
+``speed``, ``speed`` and ``ticks`` (a count that grows) are those of wheels, or of those on the left and the right,
+``turn_rate`` is to the right; ``std_h`` stands for
 both horizontal axes, ``std_vel`` for all of a velocity; ``yaw`` is clockwise from north; ``q_*`` is the quaternion body (FRD)
 to NED, or to the frame that ``input.attitude`` names, ``std_att_*`` the standard deviations about the axes of that frame. Of
 ranges, ``sat_clock_*`` and ``relativity_m`` are added to the pseudorange, ``group_delay_m``, ``ionosphere_m`` and

@@ -37,6 +37,7 @@ __all__ = [
     "RangeCorrections",
     "RangeInput",
     "ReferenceInput",
+    "SpeedInput",
     "StatusName",
     "TimeBase",
 ]
@@ -116,6 +117,19 @@ class AttitudeInput(Settings):
     heading_only: bool = False
 
 
+class SpeedInput(Settings):
+    """Wheels of a land vehicle. Of messages only used where channel names it: a twist may be of the antenna, of the body or a
+    command. scale: metres per second for a unit of the sensor (metres for a tick); fitted to the fixes' speed where it is not
+    given, together with the delay. track_m: between left and right wheels; fitted to the gyro where it is not given."""
+
+    channel: str | None = None
+    stamp: Stamp = "header"
+    time_base: TimeBase = "auto"
+    time_offset_s: float = 0.0
+    scale: float | None = None
+    track_m: Positive | None = None
+
+
 class ReferenceInput(Settings):
     """The reference solution: a file of its own, or a channel of the logs, or (from_fixes) the fixes before any are
     withheld.
@@ -190,7 +204,7 @@ class CsvMapping(Settings):
     number of each system."""
 
     match: str
-    role: Literal["imu", "fix", "velocity", "attitude", "reference", "range"]
+    role: Literal["imu", "fix", "velocity", "attitude", "reference", "range", "speed"]
     time: CsvTime
     columns: dict[Quantity, Column] = Field(min_length=1)
     delimiter: str = "auto"
@@ -224,6 +238,7 @@ class InputSettings(Settings):
     fix: FixInput = FixInput()
     range: RangeInput = RangeInput()
     attitude: AttitudeInput = AttitudeInput()
+    speed: SpeedInput = SpeedInput()
     reference: ReferenceInput = ReferenceInput()
     csv: tuple[CsvMapping, ...] = ()
     message: tuple[MessageMapping, ...] = ()

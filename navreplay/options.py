@@ -185,8 +185,8 @@ class VehicleOptions:
     the IMU in body axes [m], its place along the vehicle known to arm_std [m]; None: nobody knows) it moves neither sideways
     nor up, with standard deviations slip_std of the lateral and vertical velocity [m/s] and a slip angle of
     slip_per_acceleration [rad s^2/m] times the lateral acceleration. mounting: pitch and yaw [rad] of its axes in the body's
-    (None: to be found in the log), known to mounting_std [rad]. doubted: (start, end) of stops [GPS ns] that are not believed.
-    """
+    (None: to be found in the log), known to mounting_std [rad]. wheel_speed: where the log has it. doubted: (start, end) of
+    stops [GPS ns] that are not believed."""
 
     zero_velocity: bool = False
     zero_velocity_std: float = 0.01
@@ -198,12 +198,13 @@ class VehicleOptions:
     mounting: tuple[float, float] | None = None
     mounting_std: float = 1 * _DEG
     slip_per_acceleration: float = 0.005
+    wheel_speed: bool = True
     doubted: tuple[tuple[int, int], ...] = ()
 
     @property
     def free(self) -> "VehicleOptions":
         """The same with nothing that holds the vehicle."""
-        return replace(self, zero_velocity=False, zero_rate=False, no_slip=False)
+        return replace(self, zero_velocity=False, zero_rate=False, no_slip=False, wheel_speed=False)
 
 
 @dataclass(frozen=True, slots=True)

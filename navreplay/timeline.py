@@ -25,6 +25,7 @@ __all__ = [
     "RangeColumns",
     "RangeSeries",
     "SourceFile",
+    "SpeedSeries",
     "Timeline",
     "Trajectory",
 ]
@@ -251,6 +252,35 @@ class AttitudeSeries:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
+class SpeedSeries:
+    """Speed along a land vehicle's way by its wheels, at the middle of the rear axle.
+
+    t_ns: (n,). speed: (n,) [m/s] forward, or in a unit of the sensor's own until it is fitted to fixes. turn: (n,) angular
+    rate to the right [rad/s] by the difference of left and right wheels, or in a unit of its own; NaN where unknown. std:
+    [m/s] of one speed. scale_std: of its scale. delay_std [s]: of its time. turn_std: [rad/s] of one angular rate.
+    Raises LogError unless times strictly increase and speeds are finite.
+    """
+
+    t_ns: Times
+    speed: Floats
+    turn: Floats
+    std: float = 0.1
+    scale_std: float = 0.01
+    delay_std: float = 0.05
+    turn_std: float = 0.02
+
+    def __post_init__(self) -> None:
+        n = len(self.t_ns)
+        _check_times("speed", self.t_ns)
+        for column, values in (("speed", self.speed), ("turn", self.turn)):
+            _check_shape("speed", column, values, (n,))
+        _check_finite("speed", "speed", self.speed)
+
+    def __len__(self) -> int:
+        return len(self.t_ns)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
 class Trajectory:
     """A path: the reference solution, or a truth.
 
@@ -339,6 +369,7 @@ class Timeline:
     ranges: RangeSeries | None = None
     attitude: AttitudeSeries | None = None
     reference: Trajectory | None = None
+    speed: SpeedSeries | None = None
     fix_lever_b: Floats = field(default_factory=lambda: np.zeros(3))
     reference_lever_b: Floats = field(default_factory=lambda: np.zeros(3))
     provenance: Provenance = Provenance()

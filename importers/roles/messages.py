@@ -4,7 +4,7 @@ Types are named without the ``/msg/`` of ROS 2. ROS conventions are those of REP
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -126,7 +126,8 @@ def _twist(prefix: str) -> Callable[[Mapping[str, np.ndarray]], Rows]:
         if prefix + "linear" not in columns:
             raise KeyError(prefix + "linear")
         cov_vel = covariances(columns, "twist.covariance", 6, n)[:, :3, :3] if "twist.covariance" in columns else None
-        return Rows(vel=vectors(columns, prefix + "linear", 3, n), vel_frame="auto", cov_vel=cov_vel)
+        along = _along(columns, prefix)
+        return Rows(vel=vectors(columns, prefix + "linear", 3, n), vel_frame="auto", cov_vel=cov_vel, **along)
 
     return rows
 
@@ -146,6 +147,28 @@ def _pose(prefix: str) -> Callable[[Mapping[str, np.ndarray]], Rows]:
         return Rows(local=vectors(columns, prefix + "position", 3, n), q=q, ros_attitude=True, cov_att=cov_att)
 
     return rows
+
+
+def _odometry(columns: Mapping[str, np.ndarray]) -> Rows:
+    """Pose, and the twist, which is that of the body (nav_msgs/Odometry: in child_frame_id)."""
+    pose = _pose("pose.pose.")(columns)
+    return replace(pose, **_along(columns, "twist.twist.")) if "twist.twist.linear" in columns else pose
+
+
+def _along(columns: Mapping[str, np.ndarray], prefix: str) -> dict[str, Floats]:
+    """Speed along x and turn to the right of a twist of an FLU body."""
+    n = _count(columns)
+    forward = vectors(columns, prefix + "linear", 3, n)[:, 0]
+    angular = vectors(columns, prefix + "angular", 3, n)[:, 2] if prefix + "angular" in columns else np.full(n, np.nan)
+    unknown = np.full(n, np.nan)
+    return {"wheels": np.column_stack([forward, unknown, unknown]), "turn": -angular}
+
+
+def _ackermann(columns: Mapping[str, np.ndarray]) -> Rows:
+    if "drive.speed" not in columns:
+        raise KeyError("drive.speed")
+    speed = np.asarray(columns["drive.speed"], dtype=np.float64)
+    return Rows(wheels=np.column_stack([speed, np.full(len(speed), np.nan), np.full(len(speed), np.nan)]))
 
 
 def _quaternion(columns: Mapping[str, np.ndarray]) -> Rows:
@@ -179,6 +202,10 @@ def _text(columns: Mapping[str, np.ndarray], units_known: bool = True, means: bo
     )
 
 
+def _wheels(columns: Mapping[str, np.ndarray]) -> Rows:
+    return Rows(wheels=columns.get("wheels"), ticks=columns.get("ticks"), turn=columns.get("turn"))
+
+
 def _earth_attitude(columns: Mapping[str, np.ndarray]) -> Rows:
     return Rows(q=columns["q_eb"], q_frame="earth", cov_att=columns.get("cov_att"))
 
@@ -204,12 +231,13 @@ KINDS: dict[str, Kind] = {
     "gps_msgs/GPSFix": Kind(_FIX, gps_fix),
     "foxglove.LocationFix": Kind(_FIX, nav_sat_fix, _MSL_NOTE),
     "foxglove_msgs/LocationFix": Kind(_FIX, nav_sat_fix, _MSL_NOTE),
-    "geometry_msgs/TwistStamped": Kind(("velocity",), _twist("twist.")),
-    "geometry_msgs/TwistWithCovarianceStamped": Kind(("velocity",), _twist("twist.twist.")),
+    "geometry_msgs/TwistStamped": Kind(("velocity", "speed"), _twist("twist.")),
+    "geometry_msgs/TwistWithCovarianceStamped": Kind(("velocity", "speed"), _twist("twist.twist.")),
     "geometry_msgs/QuaternionStamped": Kind(("attitude",), _quaternion, automatic=False),
     "geometry_msgs/PoseStamped": Kind(_POSE, _pose("pose."), automatic=False),
     "geometry_msgs/PoseWithCovarianceStamped": Kind(_POSE, _pose("pose.pose."), automatic=False),
-    "nav_msgs/Odometry": Kind(_POSE, _pose("pose.pose."), automatic=False),
+    "nav_msgs/Odometry": Kind((*_POSE, "speed"), _odometry, automatic=False),
+    "ackermann_msgs/AckermannDriveStamped": Kind(("speed",), _ackermann, automatic=False),
     "foxglove.PoseInFrame": Kind(_POSE, _pose("pose."), automatic=False),
     "foxglove_msgs/PoseInFrame": Kind(_POSE, _pose("pose."), automatic=False),
     "navreplay.Imu": Kind(("imu",), _own_imu),
@@ -231,11 +259,13 @@ KINDS: dict[str, Kind] = {
     "message/fix": Kind(_FIX, _text),
     "message/velocity": Kind(("velocity",), _text),
     "message/attitude": Kind(("attitude",), _text),
+    "message/speed": Kind(("speed",), _wheels),
     "message/reference": Kind(("reference",), _text),
     "csv/imu": Kind(("imu",), _mapped),
     "csv/fix": Kind(_FIX, _mapped),
     "csv/velocity": Kind(("velocity",), _mapped),
     "csv/attitude": Kind(("attitude",), _mapped),
+    "csv/speed": Kind(("speed",), _wheels),
     "csv/reference": Kind(("reference",), _mapped),
 }
 KINDS |= {type: Kind((role,), _no_rows) for role, types in _RAW_GNSS.items() for type in types}

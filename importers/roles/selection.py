@@ -18,6 +18,7 @@ SETTING = {
     "velocity": "input.fix.velocity_channel",
     "range": "input.range.channel",
     "attitude": "input.attitude.channel",
+    "speed": "input.speed.channel",
     "reference": "input.reference.channel",
 }
 """The setting that names the channel of a role."""
@@ -67,6 +68,7 @@ def named_channel(settings: InputSettings, role: str) -> str | None:
         "velocity": settings.fix.velocity_channel,
         "range": settings.range.channel,
         "attitude": settings.attitude.channel,
+        "speed": settings.speed.channel,
         "reference": settings.reference.channel,
     }.get(role)
 
@@ -87,7 +89,9 @@ def choose_role(logs: Sequence[Log], settings: InputSettings, reference: Log | N
         return _accelerations(logs, name, settings.imu.channel)
     if name is not None:
         return _named(logs, role, name)
-    found = _foremost([choice for choice in candidates(logs, role) if _automatic(choice.channel, role)])
+    wheels = settings.speed.channel  # a twist that is told to be that of the wheels is no velocity of the antenna
+    possible = [choice for choice in candidates(logs, role) if role == "speed" or choice.channel.name != wheels]
+    found = _foremost([choice for choice in possible if _automatic(choice.channel, role)])
     return _only_one(_without_accelerations(found) if role == "imu" else found, role)
 
 

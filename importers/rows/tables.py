@@ -28,7 +28,9 @@ class Rows:
     rad, m], or local: (n, 3) east, north, up of a local origin [m]. vel: (n, 3) [m/s] in vel_frame. cov_pos: (n, 3, 3) NED.
     cov_vel: (n, 3, 3) in vel_frame. status: (n,) int8 of FixStatus or NO_FIX. q: (n, 4) scalar first, body to navigation
     or, where the type says so, q_frame; ros_attitude: of an FLU body in ENU instead of FRD in NED. cov_att: (n, 3, 3) of the
-    rotation about the axes that q leads to [rad^2]. q_missing: (n,) rows that say that they have no orientation.
+    rotation about the axes that q leads to [rad^2]. q_missing: (n,) rows that say that they have no orientation. wheels: (n, 3)
+    speeds of all, left and right wheels [m/s], or ticks: (n, 3) their counts, NaN where there is none. turn: (n,) to the right
+    [rad/s].
     """
 
     gyro: Floats | None = None
@@ -48,6 +50,9 @@ class Rows:
     q_frame: Literal["earth"] | None = None
     cov_att: Floats | None = None
     q_missing: NDArray[np.bool_] | None = None
+    wheels: Floats | None = None
+    ticks: Floats | None = None
+    turn: Floats | None = None
 
 
 def drop_absurd(values: Floats) -> Floats:

@@ -9,6 +9,7 @@ import numpy as np
 from importers.rows.clock import gps_from_gps_unix
 from importers.rows.log import Table
 from importers.rows.tables import NO_FIX, diagonal_covariance, drop_absurd, status_codes
+from importers.rows.wheels import wheel_columns
 from importers.settings import Column, CsvMapping, CsvTime
 from importers.text.csv_ranges import range_columns
 from importers.text.csv_units import in_si
@@ -48,6 +49,7 @@ _NEEDED = {
     "velocity": (("vel_n",), ("vel_neu",), ("vel_ecef",)),
     "attitude": (("euler",), ("q_nb",), ("yaw",)),
     "reference": (("lla",), ("ecef",)),
+    "speed": (("wheels",), ("ticks",)),
 }
 
 
@@ -212,6 +214,8 @@ def _build_columns(
     if mapping.role == "attitude" and "yaw" in columns and "euler" not in out:
         out["euler"] = np.column_stack([np.zeros(len(columns["yaw"]))] * 2 + [columns["yaw"]])
         out["yaw"] = columns["yaw"]
+    if mapping.role == "speed":
+        out |= wheel_columns(columns)
     if not any(out.keys() >= set(keys) for keys in _NEEDED[mapping.role]):
         wanted = " or ".join(", ".join(_GROUPS.get(key, (key,))) for keys in _NEEDED[mapping.role] for key in keys)
         raise LogError(f"{place} has the role {mapping.role}, which needs the columns {wanted}")

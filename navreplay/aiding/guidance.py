@@ -11,6 +11,7 @@ from navreplay.aiding.joint import JointAiding, JointGate
 from navreplay.aiding.no_slip import NoSlipAiding, no_slip_times
 from navreplay.aiding.ranges import RangeAiding
 from navreplay.aiding.standstill import StandstillAiding, standstill_candidates, stop_rates
+from navreplay.aiding.wheel_speed import WheelSpeedAiding, covered_times
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.error_models.launch_inertial import inertial_model
 from navreplay.error_models.ned import NedErrorModel
@@ -20,7 +21,7 @@ from navreplay.options import FilterOptions, GateOptions, VehicleOptions
 from navreplay.start.alignment import align
 from navreplay.start.heading import Sources
 from navreplay.start.told import start_as_told
-from navreplay.timeline import Floats, ImuSeries, LogError, Timeline, Times
+from navreplay.timeline import Floats, ImuSeries, LogError, SpeedSeries, Timeline, Times
 from navreplay.update.gate import Gate
 from navreplay.update.range_gate import RangeGate
 from navreplay.update.record import Recorder
@@ -28,7 +29,11 @@ from navreplay.update.verdict import EpochGate
 
 __all__ = ["Guidance", "Start", "choose_guidance"]
 
-Beside = AttitudeAiding | StandstillAiding | NoSlipAiding
+_AROUND_NS = 1_000_000_000
+_TURNING = 0.1
+"""Wheel speed [m/s] of a vehicle that does not stand still."""
+
+Beside = AttitudeAiding | StandstillAiding | NoSlipAiding | WheelSpeedAiding
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -102,33 +107,40 @@ def choose_guidance(timeline: Timeline, options: FilterOptions, recorder: Record
     others: list[Beside] = []
     if attitude is not None:
         others.append(AttitudeAiding(attitude, main.model, options.attitude))
-    others += _aid_by_vehicle(timeline.imu, main, options, recorder)
+    others += _aid_by_vehicle(timeline.imu, timeline.speed, main, options, recorder)
     aiding: Aiding = JointAiding((main, *others)) if others else main
     return Guidance(main, tuple(others), aiding, model)
 
 
 def _aid_by_vehicle(
-    imu: ImuSeries, main: FixAiding | RangeAiding, options: FilterOptions, recorder: Recorder
-) -> list[StandstillAiding | NoSlipAiding]:
+    imu: ImuSeries, wheels: SpeedSeries | None, main: FixAiding | RangeAiding, options: FilterOptions, recorder: Recorder
+) -> list[StandstillAiding | NoSlipAiding | WheelSpeedAiding]:
     """What is known of the vehicle's motion."""
     vehicle = options.vehicle
     candidates = standstill_candidates(main.t_ns, int(imu.t_ns[0]), int(imu.t_ns[-1]))
-    found: list[StandstillAiding | NoSlipAiding] = []
+    found: list[StandstillAiding | NoSlipAiding | WheelSpeedAiding] = []
     stops = np.empty(0, np.int64)
     if vehicle.zero_velocity:
         standstill = find_standstills(imu, main.fixes, candidates)
         recorder.tell(int(imu.t_ns[0]), "info" if len(standstill.t_ns) else "warning", standstill.text)
-        stops = _believed(standstill.t_ns, vehicle)
+        stops = _believed(standstill.t_ns, vehicle, wheels)
         rates = stop_rates(imu, stops, options.imu_noise.gyro_noise) if vehicle.zero_rate else None
         found.append(StandstillAiding(stops, vehicle.zero_velocity_std, main.model, rates, main.t_ns))
     if vehicle.no_slip:
         times = no_slip_times(np.setdiff1d(candidates, stops))
         found.append(NoSlipAiding(imu, times, options.alignment.forward, vehicle, main.model))
+    if wheels is not None and vehicle.wheel_speed:
+        times = covered_times(wheels, no_slip_times(candidates))
+        found.append(WheelSpeedAiding(imu, wheels, times, options.alignment.forward, vehicle, main.model))
     return found
 
 
-def _believed(t_ns: Times, vehicle: VehicleOptions) -> Times:
-    """The times (e,) of standstill outside the stops that are doubted."""
+def _believed(t_ns: Times, vehicle: VehicleOptions, wheels: SpeedSeries | None) -> Times:
+    """The times (e,) of standstill outside the stops that are doubted, and at which no wheel turns within a second."""
+    if wheels is not None:
+        turning_ns = wheels.t_ns[np.abs(wheels.speed) > max(_TURNING, 3 * wheels.std)]
+        ends = np.searchsorted(turning_ns, t_ns + _AROUND_NS, side="right")
+        t_ns = t_ns[ends == np.searchsorted(turning_ns, t_ns - _AROUND_NS)]
     for start_ns, end_ns in vehicle.doubted:
         t_ns = t_ns[(t_ns < start_ns) | (t_ns > end_ns)]
     return t_ns

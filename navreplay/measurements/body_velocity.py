@@ -20,7 +20,16 @@ from navreplay.mechanisation.strapdown import NavState
 from navreplay.timeline import Floats
 from navreplay.update.measurement import Measurement
 
-__all__ = ["BodyVelocity", "Slip", "VehiclePoint", "body_velocity", "no_slip_measurement", "zero_rate_measurement"]
+__all__ = [
+    "BodyVelocity",
+    "Slip",
+    "VehiclePoint",
+    "body_velocity",
+    "no_slip_measurement",
+    "wheel_speed_measurement",
+    "wheel_turn_measurement",
+    "zero_rate_measurement",
+]
 
 
 class VehiclePoint(NamedTuple):
@@ -78,6 +87,22 @@ def no_slip_measurement(moved: BodyVelocity, yaw_rate: float, slip: Slip) -> Mea
     """Lateral and vertical velocity zero (non-holonomic constraint); yaw_rate [rad/s]."""
     noise = slip.noise(abs(float(moved.velocity[0])), yaw_rate)
     return Measurement(-moved.velocity[1:], moved.jacobian[1:], noise, ("no_slip",) * 2, ("right", "down"))
+
+
+def wheel_speed_measurement(moved: BodyVelocity, speed: float, std: float) -> Measurement:
+    """Velocity along the vehicle's way, as its wheels tell it [m/s]."""
+    return Measurement(
+        np.array([speed - moved.velocity[0]]), moved.jacobian[:1], np.array([[std**2]]), ("wheel_speed",), ("forward",)
+    )
+
+
+def wheel_turn_measurement(turn: float, rate_b: Floats, c_vb: Floats, std: float, size: int) -> Measurement:
+    """Angular rate to the right [rad/s], as the difference of left and right wheels tells it, of a body that is computed to
+    turn with rate_b (3,) [rad/s]."""
+    jacobian = np.zeros((1, size))
+    for columns in gyro_columns(size):
+        jacobian[0, columns] = -c_vb[2]
+    return Measurement(np.array([turn - c_vb[2] @ rate_b]), jacobian, np.array([[std**2]]), ("wheel_turn",), ("right",))
 
 
 def zero_rate_measurement(rate_b: Floats, earth_b: Floats, c_nb: Floats, std: float, size: int) -> Measurement:

@@ -21,6 +21,9 @@ _UNITS = {
     "standstill": "m/s",
     "zero_rate": "rad/s",
     "no_slip": "m/s",
+    "wheel_speed": "m/s",
+    "wheel_turn": "rad/s",
+    "baro_height": "m",
 }
 
 

@@ -45,6 +45,8 @@ _EXAMPLES = {
     "no_slip": True,
     "vehicle.mounting_deg": [0.0, 0.0],
     "rear_axle_m": [-1.0, 0.0, 0.5],
+    "scale": 1.0,
+    "track_m": 1.5,
     "fix_interval_s": 1.0,
     "week": 2374,
     "outages.file": "outages.json",
@@ -80,6 +82,8 @@ _INPUT = {
     "heading_only": "roll and pitch of this sensor carry no information",
     "file": "file with the reference solution",
     "from_fixes": "take the log's own fixes, before any are withheld",
+    "scale": "metres per second for a unit of the sensor, metres for a tick; without it fitted to the fixes' speed",
+    "track_m": "between left and right wheels; without it fitted to the gyro [m]",
     "csv": "tables of numbers without a layout of their own, see docs/formats.md",
     "message": "messages of types without a meaning known here, see docs/formats.md",
     "status": 'kinds of fixes that count, such as ["fixed"]; empty: all',
@@ -94,6 +98,7 @@ _SECTIONS = {
     "input.imu": "the inertial sensor",
     "input.fix": "the GNSS receiver",
     "input.attitude": "another attitude sensor: dual antenna, AHRS, star tracker; of messages only where channel names it",
+    "input.speed": "wheels of a land vehicle; of messages only where channel names it",
     "input.reference": "the solution to compare with: a file, a channel, or the fixes themselves",
 }
 

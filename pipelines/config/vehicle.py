@@ -31,6 +31,7 @@ class VehicleSection(Section):
     slip_std_mps: tuple[Positive, Positive] = Field(
         (0.1, 0.1), description="standard deviations of the velocity sideways and up [m/s]"
     )
+    wheel_speed: bool = Field(True, description="speed by the wheels, where the log holds one (input.speed)")
     mounting_deg: tuple[float, float] | None = Field(
         None,
         description="pitch, yaw of the vehicle's axes in the IMU's; without it found in the log where no_slip is on [deg]",
@@ -49,6 +50,7 @@ class VehicleSection(Section):
             no_slip=car if self.no_slip is None else self.no_slip,
             rear_axle=self.rear_axle_m,
             slip_std=self.slip_std_mps,
+            wheel_speed=self.wheel_speed,
             mounting=None if self.mounting_deg is None else (radians(self.mounting_deg[0]), radians(self.mounting_deg[1])),
             mounting_std=radians(self.mounting_std_deg),
         )

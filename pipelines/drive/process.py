@@ -25,6 +25,7 @@ from pipelines.drive.advice import advise
 from pipelines.drive.outages import outage_windows, withhold_fixes, withhold_ranges
 from pipelines.drive.result import RunResult
 from pipelines.drive.set_up import find_set_up, options_of
+from pipelines.drive.wheels import settle_wheels
 from pipelines.trajectory.output_point import move_to_point
 
 __all__ = ["Drive", "Progress", "filter_drive", "process", "read_drive"]
@@ -61,7 +62,8 @@ def read_drive(paths: Sequence[str | Path], config: Config, progress: Progress |
     with _stage("checking", timing, progress):
         timeline, vetted = vet(timeline)
         timeline, forward, found = find_set_up(timeline, config)
-        findings = _one_of_a_kind((*vetted, *found, *preflight(timeline)))
+        timeline, wheels = settle_wheels(timeline, config)
+        findings = _one_of_a_kind((*vetted, *found, *wheels, *preflight(timeline)))
     for finding in findings:
         if finding.level == "error":
             raise LogError(f"{finding.text} {finding.hint}".strip())

@@ -1,0 +1,26 @@
+"""Columns of wheels, as a mapping names them, side by side."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from navreplay.timeline import Floats
+
+__all__ = ["wheel_columns"]
+
+_SIDES = ("", "_left", "_right")
+
+
+def wheel_columns(values: Mapping[str, np.ndarray]) -> dict[str, Floats]:
+    """``wheels`` (n, 3), ``ticks`` (n, 3) and ``turn`` (n,) of columns (n,) by quantity, NaN where one is missing; without what
+    has none at all. One side alone stands for the vehicle only together with the other."""
+    out: dict[str, Floats] = {}
+    for key, name in (("wheels", "speed"), ("ticks", "ticks")):
+        names = [name + side for side in _SIDES]
+        if name in values or values.keys() >= set(names[1:]):
+            n = len(next(values[one] for one in names if one in values))
+            parts = [np.asarray(values[one], dtype=np.float64) if one in values else np.full(n, np.nan) for one in names]
+            out[key] = np.column_stack(parts)
+    if "turn_rate" in values:
+        out["turn"] = np.asarray(values["turn_rate"], dtype=np.float64)
+    return out
