@@ -149,11 +149,12 @@ class RangeOptions:
 @dataclass(frozen=True, slots=True)
 class AttitudeOptions:
     """Measured attitude. use: let it aid the filter; else it serves alignment alone. default_std [rad]: about each axis where
-    the log does not tell its accuracy. std_floor [rad]: least one believed."""
+    the log does not tell its accuracy. std_floor [rad]: least one believed. noise_scale: on the standard deviations."""
 
     use: bool = True
     default_std: float = 1 * _DEG
     std_floor: float = 0.1 * _DEG / 3600
+    noise_scale: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -45,7 +45,9 @@ _GROWTH = 1.5
 _KIND_SCALES = {"position": "position_noise_scale", "velocity": "velocity_noise_scale"}
 _RANGE_SCALES = {"range": "pseudorange_noise_scale", "range_rate": "range_rate_noise_scale"}
 SCALED_KINDS = (*_KIND_SCALES, *_RANGE_SCALES)
-"""Kinds of measurement whose told noise the options scale; of others it is kept."""
+"""Kinds of measurement of GNSS whose told noise the options scale."""
+_ATTITUDE_KINDS = ("attitude", "heading")
+"""A log has one of them."""
 
 
 def improve_factors(logs: Sequence[LinearLog], factors: Factors) -> tuple[Factors, float]:
@@ -126,7 +128,7 @@ class EmOffline:
 
 
 def _all_ones(logs: Sequence[LinearLog]) -> Factors:
-    kinds = [kind for log in logs for kind in log.rows_by_kind if kind in SCALED_KINDS]
+    kinds = [kind for log in logs for kind in log.rows_by_kind if kind in (*SCALED_KINDS, *_ATTITUDE_KINDS)]
     names = dict.fromkeys((*kinds, *(name for log in logs for name in log.sources)))
     if not names:
         raise LogError("filter 'em-offline': no measurement lies in the time span of the filter; there is no noise to estimate")
@@ -138,12 +140,16 @@ def apply_factors(options: FilterOptions, factors: Factors) -> FilterOptions:
     roots = {name: sqrt(value) for name, value in factors.items()}
     scales = {key: getattr(options, key) * roots[kind] for kind, key in _KIND_SCALES.items() if kind in roots}
     ranges = {key: getattr(options.ranges, key) * roots[kind] for kind, key in _RANGE_SCALES.items() if kind in roots}
-    return scale_sources(replace(options, **scales, ranges=replace(options.ranges, **ranges)), roots)
+    root = next((roots[kind] for kind in _ATTITUDE_KINDS if kind in roots), 1.0)
+    attitude = replace(options.attitude, noise_scale=options.attitude.noise_scale * root)
+    return scale_sources(replace(options, **scales, ranges=replace(options.ranges, **ranges), attitude=attitude), roots)
 
 
 def estimated_figures(options: FilterOptions, factors: Factors) -> dict[str, float]:
     """The options that the factors changed, by name."""
     figures = {key: getattr(options, key) for kind, key in _KIND_SCALES.items() if kind in factors}
     figures |= {key: getattr(options.ranges, key) for kind, key in _RANGE_SCALES.items() if kind in factors}
+    if not factors.keys().isdisjoint(_ATTITUDE_KINDS):
+        figures["attitude_noise_scale"] = options.attitude.noise_scale
     figures |= {name: getattr(options.imu_noise, name) for name in IMU_SOURCES if name in factors}
     return figures | {name: getattr(options.motion, name) for name in MOTION_SOURCES if name in factors}

@@ -12,10 +12,14 @@ from navreplay.mechanisation.strapdown import Leg, NavState, Steps
 from navreplay.options import FilterOptions
 from navreplay.timeline import Floats, LogError, Times
 
-__all__ = ["output_times", "run_epochs"]
+__all__ = ["DivergedError", "output_times", "run_epochs"]
 
 _MOST_ROWS = 20_000_000
 _DAY_NS = 86_400 * 10**9
+
+
+class DivergedError(LogError):
+    """The filter left the finite numbers."""
 
 
 def run_epochs(
@@ -30,7 +34,10 @@ def run_epochs(
     options: FilterOptions,
     report: Callable[[int], None],
 ) -> Rows:
-    """From state and cov (n, n) at the beginning of the steps over all nodes (k,), with updates at t_ns[epochs]."""
+    """From state and cov (n, n) at the beginning of the steps over all nodes (k,), with updates at t_ns[epochs].
+
+    Raises DivergedError where an update leaves the finite numbers.
+    """
     ends = np.searchsorted(steps.t_ns, nodes) + 1
     rows = Rows.allocate(np.concatenate([[steps.start_ns], nodes]).astype(np.int64), state, cov, options.smooth)
 
@@ -48,6 +55,11 @@ def run_epochs(
             updated = estimator.update(epoch, state, cov, steps.dtheta[step - 1], float(steps.dt[step - 1]))
             rows.correct(node, updated)
             state, cov = updated.state, updated.cov
+            if not np.isfinite(rows.states[node]).all():
+                raise DivergedError(
+                    f"its state is no longer a number {(t_ns[epoch] - steps.start_ns) / 1e9:.1f} s behind its start; the "
+                    "likely cause is a covariance that grew without bound, of states that no measurement sees"
+                )
             report(int(t_ns[epoch]))
             if updated.lost:
                 rows = rows.until(node)

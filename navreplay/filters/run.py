@@ -13,7 +13,7 @@ from navreplay.calibration.review import Review
 from navreplay.calibration.settled import Settled, settle_nothing
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.filters.consider import Setup, check_considers, set_up
-from navreplay.filters.epochs import output_times, run_epochs
+from navreplay.filters.epochs import DivergedError, output_times, run_epochs
 from navreplay.filters.presets import Method
 from navreplay.filters.rows import Rows, backward_agreement
 from navreplay.filters.second_look import contradiction, doubtful_stops, sit_in_vehicle
@@ -217,7 +217,10 @@ def _run_stretch(
         epochs = np.flatnonzero((aiding.t_ns > start_ns) & (aiding.t_ns <= end_ns))
         nodes = np.union1d(aiding.t_ns[epochs], output_times(start_ns, end_ns, options.output_rate))
         steps = make_steps(imu, np.append(nodes, start_ns)).after(start_ns)
-        rows = run_epochs(steps, nodes, aiding.t_ns, epochs, state, cov, estimator, setup.model, options, report)
+        try:
+            rows = run_epochs(steps, nodes, aiding.t_ns, epochs, state, cov, estimator, setup.model, options, report)
+        except DivergedError as error:
+            raise LogError(f"filter '{setup.method.name}': {error}") from error
         parts.append(rows)
         lost_ns = int(rows.t_ns[-1])
         if not len(nodes) or lost_ns >= nodes[-1]:

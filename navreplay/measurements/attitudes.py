@@ -29,9 +29,9 @@ _AXES = ("north", "east", "down")
 
 
 def attitude_noise(attitude: AttitudeSeries, options: AttitudeOptions) -> Floats:
-    """R (n, 3, 3) [rad^2] of each attitude about the axes of its frame: its covariance where known, raised to the floor."""
+    """R (n, 3, 3) [rad^2] of each attitude, about the axes of its frame: scaled covariance where known, raised to the floor."""
     unknown = np.isnan(attitude.cov.sum(axis=(1, 2)))
-    cov = np.where(unknown[:, None, None], options.default_std**2 * np.eye(3), attitude.cov)
+    cov = np.where(unknown[:, None, None], options.default_std**2 * np.eye(3), attitude.cov) * options.noise_scale**2
     missing = np.maximum(options.std_floor**2 - np.diagonal(cov, axis1=1, axis2=2), 0)
     return np.asarray(cov + missing[:, :, None] * np.eye(3))
 

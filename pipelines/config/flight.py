@@ -19,10 +19,11 @@ class AttitudeSection(Section):
     use: bool = Field(True, description="let measured attitudes aid the filter; false: they serve alignment alone")
     default_std_deg: Positive = Field(1.0, description="standard deviation where the log tells none [deg]")
     std_floor_arcsec: Positive = Field(0.1, description="least standard deviation believed [arcsec]")
+    noise_scale: Positive = Field(1.0, description="multiplies the standard deviations")
 
     def options(self) -> AttitudeOptions:
         """The same in radians."""
-        return AttitudeOptions(self.use, self.default_std_deg * _DEG, self.std_floor_arcsec * _DEG / 3600)
+        return AttitudeOptions(self.use, self.default_std_deg * _DEG, self.std_floor_arcsec * _DEG / 3600, self.noise_scale)
 
 
 class LaunchSection(Section):

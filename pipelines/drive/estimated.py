@@ -16,6 +16,7 @@ _KEYS = {
     "velocity_noise_scale": ("gnss.velocity_noise_scale", 1.0),
     "pseudorange_noise_scale": ("range.pseudorange_noise_scale", 1.0),
     "range_rate_noise_scale": ("range.range_rate_noise_scale", 1.0),
+    "attitude_noise_scale": ("attitude.noise_scale", 1.0),
     "correlated_position_std": ("gnss.correlated_position_std_m", 1.0),
     "position_correlation_time": ("gnss.position_correlation_time_s", 1.0),
     "correlated_velocity_std": ("gnss.correlated_velocity_std_mps", 1.0),

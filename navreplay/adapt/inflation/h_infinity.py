@@ -6,9 +6,12 @@ Zhang et al., J. Navigation 68 (2015) 549 (there the gain is that of the unchang
 nominal standard deviation, that of the first epoch's prior; in mixed units gamma would mean nothing.
 gamma has a lower bound, where the widened prior ceases to be positive: gamma^2 is at least `margin` times the largest
 eigenvalue of L P L', so that no variance grows more than margin / (margin - 1) times.
+Only what the measurement sees is widened: of the excess X = P_k - P the part T X T' with T = P H' (H P H')^-1 H. As written, a
+state that no measurement observes is widened at every epoch until it means nothing (58 km after 60 s of stars alone).
+gamma: at the nominal covariance it adds a share 1 / (gamma^2 - 1) to a variance; the default, 1 %, is the least that still
+guards, for noise that is told right costs as much: docs/methods/h-infinity.md.
 Assumes: errors of bounded energy, nothing about their distribution.
-Fails: a state that is not observed is widened again at every epoch, faster the larger it is, so that its covariance loses
-meaning; after an outage the bound, not gamma, decides. R it does not adapt.
+Fails: after an outage the bound, not gamma, decides. R it does not adapt.
 When well specified: mean NEES per state 0.9 to 1.1, NIS per component 0.95 to 1.05.
 """
 
@@ -39,5 +42,15 @@ class HInfinity:
         values, vectors = np.linalg.eigh(prior.cov / (nominal[:, None] * nominal))
         bound = max(self.gamma**2, self.margin * float(values[-1]))
         axes = nominal[:, None] * vectors
-        cov = prior.cov + (axes * (values**2 / (bound - values))) @ axes.T
-        return Adaptation(Gaussian(prior.mean, symmetric(cov)), innovation.noise, nominal)
+        excess = (axes * (values**2 / (bound - values))) @ axes.T
+        seen = _seen(prior.cov, innovation)
+        return Adaptation(Gaussian(prior.mean, symmetric(prior.cov + seen @ excess @ seen.T)), innovation.noise, nominal)
+
+
+def _seen(cov: Floats, innovation: Innovation) -> Floats:
+    """(n, n) T of cov (n, n): P H' (H P H')^-1 H P P^-1, solved in units of each one's own standard deviation."""
+    std, spread = np.sqrt(np.diagonal(cov)), np.sqrt(np.diagonal(innovation.spread))
+    inverse = np.linalg.pinv(innovation.spread / (spread[:, None] * spread), rcond=1e-12, hermitian=True)
+    cross = innovation.cross / (std[:, None] * spread)
+    back = np.linalg.solve(cov / (std[:, None] * std), cross @ inverse.T)
+    return np.asarray(std[:, None] * (cross @ back.T) / std)

@@ -8,7 +8,8 @@ second mean nothing: here each component is normalised by its nominal standard d
 lambda multiplies all of P*, also what no measurement sees (heading and sensor errors in straight flight): there nothing takes
 back what each epoch adds, and P grows until it overflows. The guard: the standard deviations of states behind position and
 velocity are inflated only as far as `ceiling` times those of the first epoch, by P + E P* E with diagonal E, which is
-lambda P* + Q where no state is held, and positive semidefinite with C in any case.
+lambda P* + Q where no state is held, and positive semidefinite with C in any case. Position and velocity are not inflated at
+all by attitudes alone, which see next to nothing of them: nothing would ever take that back.
 Assumes: R and P_pp are right, so that an excess comes from the model.
 Fails: rho = 0.95 is a memory of about two epochs, and where P* is small against R the quotient is mostly noise: lambda exceeds
 1 about every other epoch in nominal conditions, which costs accuracy there. Outliers and noise larger than told are believed.
@@ -27,6 +28,9 @@ from navreplay.update.gaussian import symmetric
 from navreplay.update.measurement import Measurement
 
 __all__ = ["PartialTracking", "Tracked"]
+
+_KINEMATIC = frozenset({"position", "velocity", "range", "range_rate"})
+"""Kinds that see position and velocity."""
 
 
 class Tracked(NamedTuple):
@@ -62,6 +66,7 @@ class PartialTracking:
             room = np.zeros(n)
             np.divide(np.maximum(limits - np.diagonal(cov)[:n], 0), variance, out=room, where=variance > 0)
             share = np.sqrt(np.minimum(factor - 1, room))
+            share[: VELOCITY.stop] *= not _KINEMATIC.isdisjoint(measurement.kinds)
             inflated = cov.copy()
             inflated[:n, :n] += share[:, None] * moved * share
         return inflated, Tracked({**state.faded, **faded}, limits)

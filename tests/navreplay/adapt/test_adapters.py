@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.linalg import null_space
 from scipy.stats import multivariate_normal
 
 from navreplay.adapt.inflation.h_infinity import HInfinity
@@ -224,12 +225,16 @@ def test_without_gain_an_adapter_is_the_fixed_filter(name):
 
 
 @given(st.integers(0, 1000))
-def test_h_infinity_widens_the_inverse(seed):
+def test_h_infinity_widens_the_inverse_of_what_is_seen_and_nothing_else(seed):
     prior, z = draw_problem(seed)
     adapted = HInfinity(gamma=3.0, margin=2.0).adapt(np.ones(5), prior, Linearised().innovate(prior, z))
     bound = max(9.0, 2 * np.linalg.eigvalsh(prior.cov)[-1])
     expected = np.linalg.inv(np.linalg.inv(prior.cov) - np.eye(5) / bound)
-    np.testing.assert_allclose(adapted.prior.cov, expected, rtol=1e-5, atol=1e-5 * np.abs(expected).max())
+    h, found = z.jacobian, adapted.prior.cov
+    scale = np.abs(expected).max()
+    np.testing.assert_allclose(h @ found @ h.T, h @ expected @ h.T, rtol=1e-5, atol=1e-5 * scale * np.abs(h).max() ** 2)
+    unseen = null_space((prior.cov @ h.T).T)
+    np.testing.assert_allclose(unseen.T @ found @ unseen, unseen.T @ prior.cov @ unseen, rtol=1e-5, atol=1e-5 * scale)
 
 
 def test_strong_tracking_factor_is_the_printed_one():
