@@ -126,7 +126,5 @@ def test_a_filter_that_leaves_the_finite_numbers_ends_in_one_line() -> None:
             return Adaptation(prior._replace(cov=prior.cov * (np.nan if late else 1.0)), innovation.noise, None)
 
     method = replace(build_method("fixed"), name="bursting", adapter=Bursting())
-    with pytest.raises(
-        LogError, match=r"^filter 'bursting': its state is no longer a number .* behind its start"
-    ):
+    with pytest.raises(LogError, match=r"^filter 'bursting': its state is no longer a number .* behind its start"):
         run_filter(timeline, method, options)
