@@ -17,7 +17,7 @@ from importers.roles.selection import SETTING, Choice, always_used, candidates, 
 from importers.roles.sources import Clock, Source, join_sources
 from importers.rows.clock import leap_seconds
 from importers.rows.log import Channel, Log, Table
-from importers.settings import AttitudeInput, FixInput, ImuInput, InputSettings, ReferenceInput, SpeedInput
+from importers.settings import AttitudeInput, BaroInput, FixInput, ImuInput, InputSettings, ReferenceInput, SpeedInput
 from importers.vetting.vet import vet
 from navreplay.geodesy.time_scales import LeapSeconds, gps_from_utc
 from navreplay.timeline import LogError, SourceFile, Timeline, Times
@@ -219,9 +219,9 @@ def _describe(
 
 
 def _times(log: Log, channel: Channel, table: Table, role: str | None, settings: InputSettings) -> Times:
-    by_role: dict[str, ImuInput | FixInput | AttitudeInput | SpeedInput | ReferenceInput]
+    by_role: dict[str, ImuInput | FixInput | AttitudeInput | BaroInput | SpeedInput | ReferenceInput]
     by_role = {"imu": settings.imu, "accel": settings.imu, "attitude": settings.attitude, "reference": settings.reference}
-    by_role["speed"] = settings.speed
+    by_role |= {"speed": settings.speed, "baro": settings.baro}
     if role == "time" or len(table.log_time_ns) == 0:
         return np.sort(gps_from_utc(table.log_time_ns, leap_seconds(settings.leap_seconds)))
     source = Source(log.path, channel, table, role or "unused")

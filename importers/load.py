@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from importers.conversion.attitudes import convert_attitude
+from importers.conversion.barometers import convert_baro
 from importers.conversion.fixes import convert_fixes
 from importers.conversion.imu import convert_imu
 from importers.conversion.imu_pair import join_accelerations
@@ -70,7 +71,7 @@ def build_timeline(
     uses: list[ChannelUse] = [_time_use(source) for source in sources.get("time", [])]
     notes: list[str] = []
     recognised: dict[str, str] = {}
-    imu = fixes = ranges = attitude = trajectory = speed = None
+    imu = fixes = ranges = attitude = trajectory = speed = baro = None
     if "imu" in sources:
         joined = join_sources(sources["imu"], settings.imu, clock)
         if "accel" in sources:
@@ -94,6 +95,9 @@ def build_timeline(
     if "speed" in sources:
         speed, told, assumed = convert_speed(join_sources(sources["speed"], settings.speed, clock), settings.speed)
         uses, notes = [*uses, *told], [*notes, *assumed]
+    if "baro" in sources:
+        baro, told, assumed = convert_baro(join_sources(sources["baro"], settings.baro, clock))
+        uses, notes = [*uses, *told], [*notes, *assumed]
     if "reference" in sources:
         trajectory, told, assumed = _reference(sources["reference"], settings, clock, unreadable)
         uses, notes = [*uses, *told], [*notes, *assumed]
@@ -114,6 +118,7 @@ def build_timeline(
         attitude=attitude,
         reference=trajectory,
         speed=speed,
+        baro=baro,
         fix_lever_b=np.array(settings.fix.lever_arm_m),
         reference_lever_b=_reference_lever(settings),
         provenance=provenance,

@@ -33,7 +33,7 @@ class MessageMapping(Settings):
 
     topic: str | None = None
     type: str | None = None
-    role: Literal["imu", "fix", "velocity", "attitude", "reference", "speed"]
+    role: Literal["imu", "fix", "velocity", "attitude", "reference", "speed", "baro"]
     columns: dict[MessageQuantity, str] = Field(min_length=1, validation_alias=AliasChoices("columns", "fields"))
     units: dict[str, str] = Field(default_factory=dict)
     angle_unit: Literal["deg", "rad"] = "deg"

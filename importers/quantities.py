@@ -75,6 +75,8 @@ Quantity = Literal[
     "ticks",
     "ticks_left",
     "ticks_right",
+    "pressure",
+    "baro_height",
     "course",
     "std_h",
     "std_vel",
@@ -102,7 +104,7 @@ Quantity = Literal[
 ]
 """What a column of a text file can hold. ``speed`` and ``course`` (clockwise from north) are over ground; of the role
 ``speed``, ``speed`` and ``ticks`` (a count that grows) are those of wheels, or of those on the left and the right,
-``turn_rate`` is to the right; ``std_h`` stands for
+``turn_rate`` is to the right; ``pressure`` [Pa] and ``baro_height`` are of the role ``baro``; ``std_h`` stands for
 both horizontal axes, ``std_vel`` for all of a velocity; ``yaw`` is clockwise from north; ``q_*`` is the quaternion body (FRD)
 to NED, or to the frame that ``input.attitude`` names, ``std_att_*`` the standard deviations about the axes of that frame. Of
 ranges, ``sat_clock_*`` and ``relativity_m`` are added to the pseudorange, ``group_delay_m``, ``ionosphere_m`` and
@@ -174,6 +176,10 @@ _UNITS = {
     "m/s2": 1.0,
     "g": 9.80665,
     "mg": 9.80665e-3,
+    "Pa": 1.0,
+    "hPa": 100.0,
+    "kPa": 1000.0,
+    "mbar": 100.0,
     "m2": 1.0,
     "m2/s2": 1.0,
 }

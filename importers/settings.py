@@ -28,6 +28,7 @@ from importers.quantities import (
 
 __all__ = [
     "AttitudeInput",
+    "BaroInput",
     "CsvMapping",
     "CsvTime",
     "FixInput",
@@ -130,6 +131,15 @@ class SpeedInput(Settings):
     track_m: Positive | None = None
 
 
+class BaroInput(Settings):
+    """A barometer. Of messages only used where channel names it."""
+
+    channel: str | None = None
+    stamp: Stamp = "header"
+    time_base: TimeBase = "auto"
+    time_offset_s: float = 0.0
+
+
 class ReferenceInput(Settings):
     """The reference solution: a file of its own, or a channel of the logs, or (from_fixes) the fixes before any are
     withheld.
@@ -204,7 +214,7 @@ class CsvMapping(Settings):
     number of each system."""
 
     match: str
-    role: Literal["imu", "fix", "velocity", "attitude", "reference", "range", "speed"]
+    role: Literal["imu", "fix", "velocity", "attitude", "reference", "range", "speed", "baro"]
     time: CsvTime
     columns: dict[Quantity, Column] = Field(min_length=1)
     delimiter: str = "auto"
@@ -239,6 +249,7 @@ class InputSettings(Settings):
     range: RangeInput = RangeInput()
     attitude: AttitudeInput = AttitudeInput()
     speed: SpeedInput = SpeedInput()
+    baro: BaroInput = BaroInput()
     reference: ReferenceInput = ReferenceInput()
     csv: tuple[CsvMapping, ...] = ()
     message: tuple[MessageMapping, ...] = ()

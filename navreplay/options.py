@@ -186,7 +186,8 @@ class VehicleOptions:
     the IMU in body axes [m], its place along the vehicle known to arm_std [m]; None: nobody knows) it moves neither sideways
     nor up, with standard deviations slip_std of the lateral and vertical velocity [m/s] and a slip angle of
     slip_per_acceleration [rad s^2/m] times the lateral acceleration. mounting: pitch and yaw [rad] of its axes in the body's
-    (None: to be found in the log), known to mounting_std [rad]. wheel_speed: where the log has it. doubted: (start, end) of
+    (None: to be found in the log), known to mounting_std [rad]. wheel_speed: where the log has it. barometer: its changes,
+    where the log has one. height_hold: in outages it climbs nothing, to height_hold_std [m/s]. doubted: (start, end) of
     stops [GPS ns] that are not believed."""
 
     zero_velocity: bool = False
@@ -200,12 +201,22 @@ class VehicleOptions:
     mounting_std: float = 1 * _DEG
     slip_per_acceleration: float = 0.005
     wheel_speed: bool = True
+    barometer: bool = True
+    height_hold: bool = False
+    height_hold_std: float = 0.3
     doubted: tuple[tuple[int, int], ...] = ()
+
+    @property
+    def holds(self) -> bool:
+        """Whether the vehicle is held by what it cannot do."""
+        return self.zero_velocity or self.zero_rate or self.no_slip or self.height_hold
 
     @property
     def free(self) -> "VehicleOptions":
         """The same with nothing that holds the vehicle."""
-        return replace(self, zero_velocity=False, zero_rate=False, no_slip=False, wheel_speed=False)
+        return replace(
+            self, zero_velocity=False, zero_rate=False, no_slip=False, wheel_speed=False, barometer=False, height_hold=False
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 __all__ = [
     "AttitudeFrame",
     "AttitudeSeries",
+    "BaroSeries",
     "ChannelUse",
     "FixStatus",
     "GnssFixSeries",
@@ -281,6 +282,26 @@ class SpeedSeries:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
+class BaroSeries:
+    """Height by a barometer, whose zero nobody knows and which drifts: only its changes count.
+
+    t_ns: (n,). height: (n,) [m].
+    Raises LogError unless times strictly increase and heights are finite.
+    """
+
+    t_ns: Times
+    height: Floats
+
+    def __post_init__(self) -> None:
+        _check_times("baro", self.t_ns)
+        _check_shape("baro", "height", self.height, (len(self.t_ns),))
+        _check_finite("baro", "height", self.height)
+
+    def __len__(self) -> int:
+        return len(self.t_ns)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
 class Trajectory:
     """A path: the reference solution, or a truth.
 
@@ -370,6 +391,7 @@ class Timeline:
     attitude: AttitudeSeries | None = None
     reference: Trajectory | None = None
     speed: SpeedSeries | None = None
+    baro: BaroSeries | None = None
     fix_lever_b: Floats = field(default_factory=lambda: np.zeros(3))
     reference_lever_b: Floats = field(default_factory=lambda: np.zeros(3))
     provenance: Provenance = Provenance()

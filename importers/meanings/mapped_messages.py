@@ -12,7 +12,7 @@ from importers.rows.clock import count_ns, gps_from_gps_unix, gps_from_stamps, i
 from importers.rows.log import Table
 from importers.rows.message_fields import find_field, numbers_of
 from importers.rows.tables import NO_FIX, diagonal_covariance, drop_absurd, status_codes
-from importers.rows.wheels import wheel_columns
+from importers.rows.vehicle_columns import baro_columns, wheel_columns
 from navreplay.geodesy.earth import ecef_from_lla, lla_from_ecef, matrix_en
 from navreplay.geodesy.rotation import quat_from_euler
 from navreplay.geodesy.time_scales import LeapSeconds, gps_from_utc, gps_from_week_tow
@@ -32,6 +32,7 @@ _NEEDED: dict[str, tuple[tuple[str, ...], ...]] = {
     "attitude": (("q_nb",),),
     "reference": (("lla",),),
     "speed": (("wheels",), ("ticks",)),
+    "baro": (("baro",),),
 }
 _WEEK_S = 604_800
 
@@ -99,6 +100,8 @@ def _rows(values: dict[str, Floats], mapping: MessageMapping, n: int) -> dict[st
             out[key] = vector @ axes_matrix(mapping.axes).T
     if mapping.role == "speed":
         return out | wheel_columns(values)
+    if mapping.role == "baro":
+        return out | baro_columns(values)
     lla = _positions(values, mapping, n)
     if lla is not None:
         out["lla"] = lla

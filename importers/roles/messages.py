@@ -17,6 +17,7 @@ from importers.roles.receiver_types import RECEIVER_TYPES
 from importers.rows.log import Channel, Table
 from importers.rows.message_fields import covariances, numbers_of, vectors
 from importers.rows.tables import Rows
+from importers.rows.vehicle_columns import pressure_height
 from navreplay.geodesy.rotation import scalar_first_from_last
 from navreplay.timeline import Floats, LogError
 
@@ -206,6 +207,14 @@ def _wheels(columns: Mapping[str, np.ndarray]) -> Rows:
     return Rows(wheels=columns.get("wheels"), ticks=columns.get("ticks"), turn=columns.get("turn"))
 
 
+def _baro(columns: Mapping[str, np.ndarray]) -> Rows:
+    return Rows(baro=columns["baro"])
+
+
+def _fluid_pressure(columns: Mapping[str, np.ndarray]) -> Rows:
+    return Rows(baro=pressure_height(np.asarray(columns["fluid_pressure"], dtype=np.float64)))
+
+
 def _earth_attitude(columns: Mapping[str, np.ndarray]) -> Rows:
     return Rows(q=columns["q_eb"], q_frame="earth", cov_att=columns.get("cov_att"))
 
@@ -259,12 +268,15 @@ KINDS: dict[str, Kind] = {
     "message/fix": Kind(_FIX, _text),
     "message/velocity": Kind(("velocity",), _text),
     "message/attitude": Kind(("attitude",), _text),
+    "sensor_msgs/FluidPressure": Kind(("baro",), _fluid_pressure, automatic=False),
+    "message/baro": Kind(("baro",), _baro),
     "message/speed": Kind(("speed",), _wheels),
     "message/reference": Kind(("reference",), _text),
     "csv/imu": Kind(("imu",), _mapped),
     "csv/fix": Kind(_FIX, _mapped),
     "csv/velocity": Kind(("velocity",), _mapped),
     "csv/attitude": Kind(("attitude",), _mapped),
+    "csv/baro": Kind(("baro",), _baro),
     "csv/speed": Kind(("speed",), _wheels),
     "csv/reference": Kind(("reference",), _mapped),
 }

@@ -19,6 +19,7 @@ SETTING = {
     "range": "input.range.channel",
     "attitude": "input.attitude.channel",
     "speed": "input.speed.channel",
+    "baro": "input.baro.channel",
     "reference": "input.reference.channel",
 }
 """The setting that names the channel of a role."""
@@ -69,6 +70,7 @@ def named_channel(settings: InputSettings, role: str) -> str | None:
         "range": settings.range.channel,
         "attitude": settings.attitude.channel,
         "speed": settings.speed.channel,
+        "baro": settings.baro.channel,
         "reference": settings.reference.channel,
     }.get(role)
 

@@ -14,7 +14,7 @@ from importers.rows.message_fields import either_spelling
 from importers.rows.screening import Screening
 from importers.rows.stamps import mend_stamps
 from importers.rows.tables import Rows
-from importers.settings import AttitudeInput, FixInput, ImuInput, ReferenceInput, SpeedInput
+from importers.settings import AttitudeInput, BaroInput, FixInput, ImuInput, ReferenceInput, SpeedInput
 from navreplay.geodesy.time_scales import LeapSeconds
 from navreplay.timeline import ChannelUse, LogError, Times
 
@@ -60,7 +60,9 @@ class Joined:
 
 
 def join_sources(
-    sources: Sequence[Source], settings: ImuInput | FixInput | AttitudeInput | SpeedInput | ReferenceInput, clock: Clock
+    sources: Sequence[Source],
+    settings: ImuInput | FixInput | AttitudeInput | BaroInput | SpeedInput | ReferenceInput,
+    clock: Clock,
 ) -> Joined:
     """Joins the parts of a channel (a recording split into files) in the order of their first stamps. Raises LogError."""
     notes: list[str] = []
@@ -161,7 +163,10 @@ def _unknown(like: np.ndarray, n: int) -> np.ndarray:
 
 
 def _times(
-    source: Source, settings: ImuInput | FixInput | AttitudeInput | SpeedInput | ReferenceInput, clock: Clock, notes: list[str]
+    source: Source,
+    settings: ImuInput | FixInput | AttitudeInput | BaroInput | SpeedInput | ReferenceInput,
+    clock: Clock,
+    notes: list[str],
 ) -> Times:
     offset_ns = round(settings.time_offset_s * 1e9)
     name, table = source.channel.name, source.table

@@ -30,7 +30,7 @@ class Rows:
     or, where the type says so, q_frame; ros_attitude: of an FLU body in ENU instead of FRD in NED. cov_att: (n, 3, 3) of the
     rotation about the axes that q leads to [rad^2]. q_missing: (n,) rows that say that they have no orientation. wheels: (n, 3)
     speeds of all, left and right wheels [m/s], or ticks: (n, 3) their counts, NaN where there is none. turn: (n,) to the right
-    [rad/s].
+    [rad/s]. baro: (n,) height by pressure [m].
     """
 
     gyro: Floats | None = None
@@ -53,6 +53,7 @@ class Rows:
     wheels: Floats | None = None
     ticks: Floats | None = None
     turn: Floats | None = None
+    baro: Floats | None = None
 
 
 def drop_absurd(values: Floats) -> Floats:

@@ -9,7 +9,7 @@ import numpy as np
 from importers.rows.clock import gps_from_gps_unix
 from importers.rows.log import Table
 from importers.rows.tables import NO_FIX, diagonal_covariance, drop_absurd, status_codes
-from importers.rows.wheels import wheel_columns
+from importers.rows.vehicle_columns import baro_columns, wheel_columns
 from importers.settings import Column, CsvMapping, CsvTime
 from importers.text.csv_ranges import range_columns
 from importers.text.csv_units import in_si
@@ -50,6 +50,7 @@ _NEEDED = {
     "attitude": (("euler",), ("q_nb",), ("yaw",)),
     "reference": (("lla",), ("ecef",)),
     "speed": (("wheels",), ("ticks",)),
+    "baro": (("baro",),),
 }
 
 
@@ -216,6 +217,8 @@ def _build_columns(
         out["yaw"] = columns["yaw"]
     if mapping.role == "speed":
         out |= wheel_columns(columns)
+    if mapping.role == "baro":
+        out |= baro_columns(columns)
     if not any(out.keys() >= set(keys) for keys in _NEEDED[mapping.role]):
         wanted = " or ".join(", ".join(_GROUPS.get(key, (key,))) for keys in _NEEDED[mapping.role] for key in keys)
         raise LogError(f"{place} has the role {mapping.role}, which needs the columns {wanted}")

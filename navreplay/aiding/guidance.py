@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from navreplay.aiding.attitudes import AttitudeAiding
+from navreplay.aiding.climb import ClimbAiding, unaided_times
 from navreplay.aiding.epochs import Aiding
 from navreplay.aiding.fixes import FixAiding
 from navreplay.aiding.joint import JointAiding, JointGate
@@ -15,13 +16,14 @@ from navreplay.aiding.wheel_speed import WheelSpeedAiding, covered_times
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.error_models.launch_inertial import inertial_model
 from navreplay.error_models.ned import NedErrorModel
+from navreplay.measurements.climb import find_climbs
 from navreplay.measurements.standstill import find_standstills
 from navreplay.mechanisation.strapdown import NavState
 from navreplay.options import FilterOptions, GateOptions, VehicleOptions
 from navreplay.start.alignment import align
 from navreplay.start.heading import Sources
 from navreplay.start.told import start_as_told
-from navreplay.timeline import Floats, ImuSeries, LogError, SpeedSeries, Timeline, Times
+from navreplay.timeline import BaroSeries, Floats, ImuSeries, LogError, SpeedSeries, Timeline, Times
 from navreplay.update.gate import Gate
 from navreplay.update.range_gate import RangeGate
 from navreplay.update.record import Recorder
@@ -33,7 +35,8 @@ _AROUND_NS = 1_000_000_000
 _TURNING = 0.1
 """Wheel speed [m/s] of a vehicle that does not stand still."""
 
-Beside = AttitudeAiding | StandstillAiding | NoSlipAiding | WheelSpeedAiding
+VehicleAiding = StandstillAiding | NoSlipAiding | WheelSpeedAiding | ClimbAiding
+Beside = AttitudeAiding | VehicleAiding
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -97,7 +100,7 @@ def choose_guidance(timeline: Timeline, options: FilterOptions, recorder: Record
         if attitude is None or options.use not in ("auto", "attitudes"):
             raise _nothing_to_use(options)
         alone = AttitudeAiding(attitude, model, options.attitude)
-        if options.vehicle.free != options.vehicle:
+        if options.vehicle.holds:
             text = (
                 "vehicle.zero_velocity and what else is known of the vehicle are not used: without fixes nothing tells which "
                 "IMU noise is that of standstill"
@@ -108,17 +111,18 @@ def choose_guidance(timeline: Timeline, options: FilterOptions, recorder: Record
     if attitude is not None:
         others.append(AttitudeAiding(attitude, main.model, options.attitude))
     others += _aid_by_vehicle(timeline.imu, timeline.speed, main, options, recorder)
+    others += _aid_by_climb(timeline.imu, timeline.baro, main, options.vehicle, recorder)
     aiding: Aiding = JointAiding((main, *others)) if others else main
     return Guidance(main, tuple(others), aiding, model)
 
 
 def _aid_by_vehicle(
     imu: ImuSeries, wheels: SpeedSeries | None, main: FixAiding | RangeAiding, options: FilterOptions, recorder: Recorder
-) -> list[StandstillAiding | NoSlipAiding | WheelSpeedAiding]:
+) -> list[VehicleAiding]:
     """What is known of the vehicle's motion."""
     vehicle = options.vehicle
     candidates = standstill_candidates(main.t_ns, int(imu.t_ns[0]), int(imu.t_ns[-1]))
-    found: list[StandstillAiding | NoSlipAiding | WheelSpeedAiding] = []
+    found: list[VehicleAiding] = []
     stops = np.empty(0, np.int64)
     if vehicle.zero_velocity:
         standstill = find_standstills(imu, main.fixes, candidates)
@@ -132,6 +136,23 @@ def _aid_by_vehicle(
     if wheels is not None and vehicle.wheel_speed:
         times = covered_times(wheels, no_slip_times(candidates))
         found.append(WheelSpeedAiding(imu, wheels, times, options.alignment.forward, vehicle, main.model))
+    return found
+
+
+def _aid_by_climb(
+    imu: ImuSeries, baro: BaroSeries | None, main: FixAiding | RangeAiding, vehicle: VehicleOptions, recorder: Recorder
+) -> list[VehicleAiding]:
+    """What is known of height: changes by a barometer; none, in outages, where that is asked for."""
+    found: list[VehicleAiding] = []
+    if baro is not None and vehicle.barometer:
+        climbs = find_climbs(baro, main.fixes)
+        recorder.tell(int(imu.t_ns[0]), "info" if len(climbs.t_ns) else "warning", climbs.text)
+        found.append(ClimbAiding(climbs.t_ns, climbs.rate, climbs.std, "climb", main.model))
+    if vehicle.height_hold:
+        candidates = standstill_candidates(main.t_ns, int(imu.t_ns[0]), int(imu.t_ns[-1]))
+        times = unaided_times(main.t_ns, no_slip_times(candidates))
+        still, std = np.zeros(len(times)), np.full(len(times), vehicle.height_hold_std)
+        found.append(ClimbAiding(times, still, std, "height_hold", main.model))
     return found
 
 

@@ -171,7 +171,7 @@ def _choose_ranges_alone(timeline: Timeline, options: FilterOptions, recorder: R
         "its roll and pitch are unknown"
     )
     recorder.tell(int(timeline.ranges.t_ns[0]), "warning", text)
-    if options.vehicle.free != options.vehicle:
+    if options.vehicle.holds:
         text = "vehicle.zero_velocity and what else is known of the vehicle are not used: without IMU nothing tells them"
         recorder.tell(int(timeline.ranges.t_ns[0]), "warning", text)
     return RangeAiding(timeline.ranges, timeline.fix_lever_b, None, options, recorder)

@@ -23,7 +23,8 @@ _UNITS = {
     "no_slip": "m/s",
     "wheel_speed": "m/s",
     "wheel_turn": "rad/s",
-    "baro_height": "m",
+    "climb": "m/s",
+    "height_hold": "m/s",
 }
 
 

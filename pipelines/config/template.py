@@ -99,6 +99,7 @@ _SECTIONS = {
     "input.fix": "the GNSS receiver",
     "input.attitude": "another attitude sensor: dual antenna, AHRS, star tracker; of messages only where channel names it",
     "input.speed": "wheels of a land vehicle; of messages only where channel names it",
+    "input.baro": "a barometer; of messages only where channel names it",
     "input.reference": "the solution to compare with: a file, a channel, or the fixes themselves",
 }
 

@@ -32,6 +32,9 @@ class VehicleSection(Section):
         (0.1, 0.1), description="standard deviations of the velocity sideways and up [m/s]"
     )
     wheel_speed: bool = Field(True, description="speed by the wheels, where the log holds one (input.speed)")
+    barometer: bool = Field(True, description="changes of height by a barometer, where the log holds one (input.baro)")
+    height_hold: bool = Field(False, description="in outages the height stays, as on flat ground or on water")
+    height_hold_std_mps: Positive = Field(0.3, description="how fast it may change nevertheless [m/s]")
     mounting_deg: tuple[float, float] | None = Field(
         None,
         description="pitch, yaw of the vehicle's axes in the IMU's; without it found in the log where no_slip is on [deg]",
@@ -51,6 +54,9 @@ class VehicleSection(Section):
             rear_axle=self.rear_axle_m,
             slip_std=self.slip_std_mps,
             wheel_speed=self.wheel_speed,
+            barometer=self.barometer,
+            height_hold=self.height_hold,
+            height_hold_std=self.height_hold_std_mps,
             mounting=None if self.mounting_deg is None else (radians(self.mounting_deg[0]), radians(self.mounting_deg[1])),
             mounting_std=radians(self.mounting_std_deg),
         )

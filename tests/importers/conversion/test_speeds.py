@@ -1,4 +1,4 @@
-"""Speeds of wheels: of messages that are named, of tables, of counters that turn over; never an antenna's velocity."""
+"""Speeds of wheels, and barometers: of messages that are named, of tables, of counters; never an antenna's velocity."""
 
 import numpy as np
 import pytest
@@ -73,6 +73,20 @@ def test_what_is_not_finite_is_counted(tmp_path):
     table.columns["twist.twist.linear"][:] = np.nan
     with pytest.raises(LogError, match="none of its 50 speeds"):
         load(tmp_path, {"/odom": ("nav_msgs/Odometry", table)}, "/odom")
+
+
+def test_a_barometer_that_is_named_tells_height(tmp_path):
+    t = stamps(N, 10)
+    pressure = np.full(N, 89_874.6)
+    pressure[3] = 0.0
+    table = Table(t, {"header.stamp": t, "fluid_pressure": pressure, "variance": np.zeros(N)}, N)
+    logs = {"/imu": ("sensor_msgs/Imu", imu_table()), "/fix": ("sensor_msgs/NavSatFix", fix_table())}
+    logs["/baro"] = ("sensor_msgs/FluidPressure", table)
+    assert load_tables(tmp_path, logs).baro is None
+    timeline = load_tables(tmp_path, logs, {"baro": {"channel": "/baro"}})
+    np.testing.assert_allclose(timeline.baro.height, 1000.0, atol=0.5)
+    use = next(use for use in timeline.provenance.channels if use.name == "/baro")
+    assert (use.read, use.used) == (N, N - 1)
 
 
 TABLE = """
