@@ -14,7 +14,7 @@ from pipelines.drive.headline import FIGURES, headline
 from pipelines.drive.process import Drive
 from pipelines.drive.result import RunResult
 from pipelines.frames import Frame, TabularSolution, error_frame, innovation_frame
-from pipelines.trajectory.solution_csv import read_columns
+from pipelines.trajectory.solution_csv import find_solution, read_columns
 
 if TYPE_CHECKING:
     import pandas
@@ -97,7 +97,7 @@ class FinishedRun:
 def open_run(folder: str | Path) -> FinishedRun:
     """What `write_outputs` or `navreplay run` left in a folder. Raises LogError where it is none of these."""
     folder = Path(folder)
-    t_ns, columns = read_columns(folder / "solution.csv")
+    t_ns, columns = read_columns(find_solution(folder))
     try:
         report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:

@@ -25,7 +25,7 @@ from pipelines.report.markdown import render_markdown
 from pipelines.report.tables import headline_figures, report_tables
 from pipelines.report.verdict import verdict_notice
 from pipelines.trajectory.launch_csv import write_launch_csv
-from pipelines.trajectory.solution_csv import utc_text, write_solution_csv
+from pipelines.trajectory.solution_csv import utc_text, write_solution_csv, write_solution_parquet
 
 __all__ = ["write_comparison", "write_each", "write_outputs"]
 
@@ -34,8 +34,8 @@ _LONGEST_NAMES = 60
 
 
 def write_outputs(result: RunResult, out_dir: str | Path, layer: tuple[str, str] | None = None) -> dict[str, Path]:
-    """Writes solution.csv, report.json, report.md, report.html, config.toml, config.estimated.toml where the method estimated
-    noise from the whole log, launch.csv in the launch-inertial frame, and, unless the configuration says otherwise,
+    """Writes solution.csv or .parquet, report.json, report.md, report.html, config.toml, config.estimated.toml where the method
+    estimated noise from the whole log, launch.csv in the launch-inertial frame, and, unless the configuration says otherwise,
     recording.rrd; layer: the segment of a catalogue that the recording belongs to and its name there (see
     `write_recording`). Returns the paths by name. Raises LogError when the folder cannot be written."""
     report = build_report(result)
@@ -43,8 +43,9 @@ def write_outputs(result: RunResult, out_dir: str | Path, layer: tuple[str, str]
     figures, tables, notice = headline_figures(report), report_tables(report), verdict_notice(report["verdict"])
     html = render_html(title, subtitle, figures, report_plots(result), tables, report["configuration"], notice)
     markdown = render_markdown(title, figures, tables, notice)
+    write_solution = write_solution_csv if result.config.output.format == "csv" else write_solution_parquet
     writers: dict[str, Callable[[Path], object]] = {
-        "solution.csv": lambda path: write_solution_csv(path, result.solution),
+        f"solution.{result.config.output.format}": lambda path: write_solution(path, result.solution),
         "report.json": lambda path: path.write_text(dump_json(report), encoding="utf-8"),
         "report.md": lambda path: path.write_text(markdown, encoding="utf-8"),
         "report.html": lambda path: path.write_text(html, encoding="utf-8"),

@@ -139,12 +139,18 @@ def _known(value: Any) -> float | None:
 
 def separate(before: Path, after: Path, drive: str, method: str) -> Separation | None:
     """How far the trajectories of a run are apart at the times that both have; None without such times. Raises LogError."""
-    old, new = (read_solution_csv(local(folder, f"drives/{drive}/{method}/solution.csv")) for folder in (before, after))
+    old, new = (read_solution_csv(_solution_of(folder, drive, method)) for folder in (before, after))
     t_ns, a, b = np.intersect1d(old.t_ns, new.t_ns, return_indices=True)
     if not len(a):
         return None
     lla = old.lla[a]
     return Separation(t_ns, lla, ned_between(lla, new.lla[b]), ned_between(lla[0], lla))
+
+
+def _solution_of(folder: Path, drive: str, method: str) -> Path:
+    """In the format that the run's own configuration names."""
+    config = _read_toml(local(folder, f"drives/{drive}/{method}/config.toml"))
+    return local(folder, f"drives/{drive}/{method}/solution.{config.get('output', {}).get('format', 'csv')}")
 
 
 def _changed_settings(before: Path, after: Path, drive: str, method: str) -> tuple[str, ...]:

@@ -280,6 +280,7 @@ class OutputSection(Section):
         None, description="point the solution describes: forward, right, down from the IMU [m]; without it the IMU"
     )
     recording: bool = Field(True, description="write recording.rrd")
+    format: Literal["csv", "parquet"] = Field("csv", description="solution.csv, or solution.parquet with all digits")
 
 
 class OutageSection(Section):

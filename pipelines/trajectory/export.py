@@ -20,7 +20,7 @@ from navreplay.geodesy.rotation import (
 from navreplay.geodesy.time_scales import utc_from_gps, week_tow_from_gps
 from navreplay.timeline import Floats, LogError
 from pipelines.files.whole_file import write_whole
-from pipelines.trajectory.solution_csv import SolutionTable, read_solution_csv, utc_text
+from pipelines.trajectory.solution_csv import SolutionTable, find_solution, read_solution_csv, utc_text
 
 __all__ = ["EXPORT_FORMATS", "export"]
 
@@ -43,15 +43,17 @@ _KML = """<?xml version="1.0" encoding="UTF-8"?>
 def export(out_dir: Path, format: str, path: Path) -> None:
     """Writes the trajectory of the run in out_dir to path in one of `EXPORT_FORMATS`.
 
-    Raises LogError for an unknown format, a folder without a readable solution.csv, or a path that cannot be written.
+    Raises LogError for an unknown format, a folder without a readable solution, or a path that cannot be written.
     """
     if format not in EXPORT_FORMATS:
         raise LogError(f"--format {format}: not an export format; there are {', '.join(EXPORT_FORMATS)}")
-    solution = out_dir / "solution.csv"
+    solution = find_solution(out_dir)
     table = read_solution_csv(solution)
     try:
-        if format == "csv":
+        if f".{format}" == solution.suffix:
             write_whole(path, lambda part: shutil.copyfile(solution, part))
+        elif format == "csv":
+            write_whole(path, lambda part: _write_csv(part, solution))
         elif format == "parquet":
             write_whole(path, lambda part: _write_parquet(part, solution))
         else:
@@ -124,6 +126,16 @@ def _write_parquet(path: Path, solution: Path) -> None:
     parquet.write_table(csv.read_csv(solution, convert_options=csv.ConvertOptions(column_types=types)), path)
 
 
+def _write_csv(path: Path, solution: Path) -> None:
+    """Of a solution.parquet, with all its digits."""
+    table = parquet.read_table(solution)
+    utc = pa.array(np.char.add(np.datetime_as_string(table["utc"].to_numpy().astype("datetime64[us]")), "Z"))
+    table = table.set_column(table.column_names.index("utc"), "utc", utc)
+    with path.open("wb") as file:
+        file.write((",".join(table.column_names) + "\n").encode())
+        csv.write_csv(table, file, csv.WriteOptions(include_header=False, quoting_style="none"))
+
+
 def _write_lines(path: Path, lines: list[str]) -> None:
     with path.open("w", encoding="ascii", newline="") as file:
         file.writelines(lines)
@@ -138,7 +150,7 @@ _WRITERS: dict[str, Writer] = {
     "sbet": _write_sbet,
 }
 EXPORT_FORMATS = {
-    "csv": "solution.csv as it is",
+    "csv": "solution.csv as it is, or the same columns from solution.parquet",
     "parquet": "the columns of solution.csv in Apache Parquet",
     "tum": "TUM trajectory: UTC seconds, east, north, up of the first row, quaternion of the forward-left-up body",
     "kitti": "KITTI odometry poses, 3 x 4 matrices in the frame of tum, without times",

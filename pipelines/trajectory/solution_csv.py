@@ -5,22 +5,26 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-from pyarrow import csv
+from pyarrow import csv, parquet
 
 from navreplay.geodesy.rotation import euler_from_quat
 from navreplay.geodesy.time_scales import gps_from_week_tow, utc_from_gps, week_tow_from_gps
 from navreplay.solution import RowStatus, Solution
 from navreplay.timeline import Floats, LogError, Times
+from pipelines.trajectory import _text_kernel
 
 __all__ = [
     "COLUMNS",
     "SolutionTable",
     "euler_std",
+    "find_solution",
     "read_columns",
     "read_solution_csv",
     "solution_columns",
     "utc_text",
+    "write_plain",
     "write_solution_csv",
+    "write_solution_parquet",
 ]
 
 _DPH = np.degrees(3600)
@@ -58,7 +62,15 @@ COLUMNS = {
 }
 """Column names in order, with their formats: a latitude to a micrometre, a time of week to a nanosecond."""
 
+_STATUS_NAMES = {int(status): status.name.lower() for status in sorted(RowStatus)}
+_LARGEST = 1e8
+"""Of any number: beyond it a double has not all the decimals that are written."""
+_LINES, _LONGEST_LINE = 8192, 1024
+_DAY_US = 86_400_000_000
 _NUMBERS = tuple(name for name in COLUMNS if name not in ("gps_week", "gps_tow_s", "utc", "status"))
+
+_DECIMALS = np.array([-6 if COLUMNS[name] == "%.6g" else int(COLUMNS[name][2:-1]) for name in _NUMBERS])
+"""After the point, or significant digits below zero."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -120,25 +132,67 @@ def _number_columns(solution: Solution) -> Floats:
 def solution_columns(solution: Solution) -> dict[str, np.ndarray]:
     """The columns of solution.csv but utc, each (k,), as numbers and names."""
     week, tow = week_tow_from_gps(solution.t_ns)
-    names = {status: status.name.lower() for status in RowStatus}
-    status = np.array([names[RowStatus(value)] for value in solution.status.tolist()], dtype=object)
+    status = np.array(list(_STATUS_NAMES.values()), dtype=object)[np.searchsorted(list(_STATUS_NAMES), solution.status)]
     numbers = dict(zip(_NUMBERS, _number_columns(solution).T, strict=True))
     return {"gps_week": np.asarray(week), "gps_tow_s": np.asarray(tow), **numbers, "status": status}
 
 
 def write_solution_csv(path: Path, solution: Solution) -> None:
     """Writes the solution, the same bytes for the same solution."""
-    week, _ = week_tow_from_gps(solution.t_ns)
-    week_start = gps_from_week_tow(week, np.zeros(len(week)))
-    second, nanosecond = np.divmod(solution.t_ns - week_start, 1_000_000_000)
     numbers = _number_columns(solution)
-    names = {status: status.name.lower() for status in RowStatus}
-    status = [names[RowStatus(value)] for value in solution.status.tolist()]
-    columns = [week.tolist(), second.tolist(), nanosecond.tolist(), utc_text(solution.t_ns), *numbers.T.tolist(), status]
+    # NaN and what has more digits than a double are rare, and the plain way knows them
+    if not (np.abs(numbers) < _LARGEST).all():
+        write_plain(path, solution)
+        return
+    week, tow, status = _whole_columns(solution)
+    names = np.array([name.encode() for name in _STATUS_NAMES.values()])
+    codes = np.searchsorted(list(_STATUS_NAMES), status)
+    microseconds = np.asarray(utc_from_gps(solution.t_ns)) // 1000
+    day, time = np.divmod(microseconds, _DAY_US)
+    each, days = np.unique(day, return_inverse=True)
+    dates = np.datetime_as_string(each.astype("datetime64[D]")).astype("S10")
+    letters = [part.view(np.uint8).reshape(len(part), -1) for part in (dates, names)]
+    text = np.empty(_LINES * _LONGEST_LINE, dtype=np.uint8)
+    with path.open("wb") as file:
+        file.write((",".join(COLUMNS) + "\n").encode())
+        for first in range(0, len(solution), _LINES):
+            rows = slice(first, first + _LINES)
+            whole = week[rows], tow[rows], days[rows], letters[0], time[rows]
+            length = _text_kernel.put_rows(*whole, numbers[rows], _DECIMALS, codes[rows], letters[1], text)
+            file.write(text[:length].data)
+
+
+def write_plain(path: Path, solution: Solution) -> None:
+    """The same by the formats of `COLUMNS`, row by row."""
+    week, tow, codes = _whole_columns(solution)
+    second, nanosecond = np.divmod(tow, 1_000_000_000)
+    status = [_STATUS_NAMES[code] for code in codes.tolist()]
+    numbers = _number_columns(solution).T.tolist()
+    columns = [week.tolist(), second.tolist(), nanosecond.tolist(), utc_text(solution.t_ns), *numbers, status]
     line = ",".join(COLUMNS.values()) + "\n"
     with path.open("w", encoding="ascii", newline="") as file:
         file.write(",".join(COLUMNS) + "\n")
         file.writelines(line % row for row in zip(*columns, strict=True))
+
+
+def _whole_columns(solution: Solution) -> tuple[Times, Times, np.ndarray]:
+    """Week, nanoseconds of the week and code of the status, (k,) each."""
+    week = np.asarray(week_tow_from_gps(solution.t_ns)[0]).astype(np.int64)
+    return week, solution.t_ns - gps_from_week_tow(week, np.zeros(len(week))), solution.status
+
+
+def find_solution(folder: Path) -> Path:
+    """Where the solution is that a run left in its folder, in either format."""
+    other = folder / "solution.parquet"
+    return other if other.exists() and not (folder / "solution.csv").exists() else folder / "solution.csv"
+
+
+def write_solution_parquet(path: Path, solution: Solution) -> None:
+    """Writes the columns of solution.csv with all their digits, utc as a timestamp."""
+    columns = solution_columns(solution)
+    utc = np.asarray(utc_from_gps(solution.t_ns)).astype("datetime64[ns]").astype("datetime64[us]")
+    special = {"utc": pa.array(utc, pa.timestamp("us", tz="UTC"))}
+    parquet.write_table(pa.table({name: special[name] if name in special else columns[name] for name in COLUMNS}), path)
 
 
 def read_columns(path: Path) -> tuple[Times, dict[str, np.ndarray]]:
@@ -169,7 +223,10 @@ def _read_table(path: Path) -> pa.Table:
     types = {name: pa.float64() for name in (*_NUMBERS, "gps_tow_s")} | {"gps_week": pa.int64(), "status": pa.string()}
     options = csv.ConvertOptions(column_types=types, include_columns=[name for name in COLUMNS if name != "utc"])
     try:
-        table = csv.read_csv(path, convert_options=options)
+        if path.suffix == ".parquet":
+            table = parquet.read_table(path, columns=list(types)).cast(pa.schema(types))
+        else:
+            table = csv.read_csv(path, convert_options=options)
     except OSError as error:
         raise LogError(f"{path}: cannot read the solution; is this folder what `navreplay run -o` wrote? ({error})") from error
     except (pa.ArrowInvalid, KeyError) as error:

@@ -13,6 +13,7 @@ from navreplay.solution import Event
 from navreplay.timeline import LogError
 from pipelines.config.sections import OutputSection
 from pipelines.drive.result import RunResult
+from pipelines.notebook import open_run
 from pipelines.outputs import write_outputs
 from pipelines.report.content import build_report, dump_json
 from pipelines.report.table import figure_text, interval_text
@@ -69,6 +70,16 @@ def test_outputs_are_named_and_nothing_else_is_left(result: RunResult, tmp_path:
     names = ["solution.csv", "report.json", "report.md", "report.html", "config.toml"]
     assert list(outputs) == names
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
+
+
+def test_the_solution_is_parquet_where_that_is_asked_for(result: RunResult, tmp_path: Path) -> None:
+    output = result.config.output.model_copy(update={"format": "parquet"})
+    outputs = write_outputs(replace(result, config=result.config.model_copy(update={"output": output})), tmp_path)
+    assert "solution.parquet" in outputs
+    assert not (tmp_path / "solution.csv").exists()
+    assert np.allclose(
+        open_run(tmp_path).solution.columns["lat_deg"], np.degrees(result.solution.lla[:, 0]), rtol=0, atol=1e-12
+    )
 
 
 def test_folder_that_cannot_be_written_is_told(result: RunResult, tmp_path: Path) -> None:

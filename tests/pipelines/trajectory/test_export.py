@@ -3,6 +3,7 @@
 import json
 import re
 import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,14 @@ from navreplay.geodesy.time_scales import utc_from_gps, week_tow_from_gps
 from navreplay.solution import Solution
 from navreplay.timeline import LogError
 from pipelines.trajectory.export import EXPORT_FORMATS, export
-from pipelines.trajectory.solution_csv import COLUMNS, euler_std, read_solution_csv, write_solution_csv
+from pipelines.trajectory.solution_csv import (
+    COLUMNS,
+    euler_std,
+    read_solution_csv,
+    write_plain,
+    write_solution_csv,
+    write_solution_parquet,
+)
 from tests.helpers.sample_drive import make_solution
 
 
@@ -160,3 +168,71 @@ def test_an_exported_sbet_can_be_read_again(run_folder: Path, solution: Solution
     assert np.abs(ned_between(solution.lla, columns["lla"])).max() < 1e-5
     assert np.allclose(columns["vel_n"], solution.vel_n, atol=1e-4)
     assert np.allclose(euler_from_quat(columns["q_nb"]), euler_from_quat(solution.q_nb), atol=1e-8)
+
+
+def test_the_compiled_writer_writes_what_the_plain_one_does(tmp_path: Path, solution: Solution) -> None:
+    rng = np.random.default_rng(5)
+    count = 20_000
+    cov = np.zeros((count, 15, 15))
+    cov[:, range(9), range(9)] = 10.0 ** rng.uniform(-18, 14, (count, 9))
+    cov[:3, 0, 0] = 0.0, 1e-10, 1e12
+    many = replace(
+        solution,
+        t_ns=solution.t_ns[0] + np.sort(rng.integers(0, 3 * 86_400 * 10**9, count)),
+        lla=np.stack([rng.uniform(-1.5, 1.5, count), rng.uniform(-3.1, 3.1, count), rng.uniform(-400, 9e5, count)], axis=1),
+        vel_n=rng.standard_normal((count, 3)) * 10.0 ** rng.integers(-9, 4, (count, 1)),
+        q_nb=quat_from_rotvec(rng.standard_normal((count, 3))),
+        gyro_bias=rng.standard_normal((count, 3)) * 1e-3,
+        accel_bias=rng.standard_normal((count, 3)) * 0.1,
+        cov=cov,
+        status=rng.integers(0, 4, count).astype(np.int8),
+    )
+    write_solution_csv(tmp_path / "fast.csv", many)
+    write_plain(tmp_path / "plain.csv", many)
+    fast, plain = ((tmp_path / name).read_text().splitlines() for name in ("fast.csv", "plain.csv"))
+    assert len(fast) == len(plain) == count + 1
+    different = [
+        (name, a, b)
+        for one, other in zip(fast, plain, strict=True)
+        if one != other
+        for name, a, b in zip(COLUMNS, one.split(","), other.split(","), strict=True)
+        if a != b
+    ]
+    # where a digit is on the edge, a product may round to its other side
+    assert len(different) < 1e-4 * count * len(COLUMNS)
+    for name, a, b in different:
+        step = 2e-5 * abs(float(b)) if COLUMNS[name] == "%.6g" else 1.01 * 10.0 ** -int(COLUMNS[name][2:-1])
+        assert abs(float(a) - float(b)) <= step
+
+
+def test_a_solution_with_what_is_no_number_is_written_too(tmp_path: Path, solution: Solution) -> None:
+    accel_bias = solution.accel_bias.copy()
+    accel_bias[1, 0], accel_bias[2, 1] = np.nan, 1e9
+    write_solution_csv(tmp_path / "solution.csv", replace(solution, accel_bias=accel_bias))
+    table = read_solution_csv(tmp_path / "solution.csv")
+    assert np.isnan(table.accel_bias[1, 0])
+    assert table.accel_bias[2, 1] == pytest.approx(1e9)
+
+
+def test_parquet_holds_the_solution_with_all_its_digits(tmp_path: Path, solution: Solution) -> None:
+    write_solution_parquet(tmp_path / "solution.parquet", solution)
+    table = parquet.read_table(tmp_path / "solution.parquet")
+    assert table.column_names == list(COLUMNS)
+    assert np.array_equal(table["vel_n_mps"].to_numpy(), solution.vel_n[:, 0])
+    read = read_solution_csv(tmp_path / "solution.parquet")
+    assert np.array_equal(read.t_ns, solution.t_ns)
+    assert set(read.status) == {"updated", "predicted", "rejected"}
+
+
+def test_a_folder_with_parquet_exports_like_one_with_csv(run_folder: Path, tmp_path: Path, solution: Solution) -> None:
+    other = tmp_path / "other"
+    other.mkdir()
+    write_solution_parquet(other / "solution.parquet", solution)
+    export(other, "csv", tmp_path / "back.csv")
+    first, again = read_solution_csv(run_folder / "solution.csv"), read_solution_csv(tmp_path / "back.csv")
+    assert np.array_equal(first.t_ns, again.t_ns)
+    assert np.allclose(first.lla, again.lla, rtol=0, atol=1e-5)
+    first_line = (run_folder / "solution.csv").read_text().splitlines()[1].split(",")
+    assert (tmp_path / "back.csv").read_text().splitlines()[1].split(",")[2] == first_line[2]
+    export(other, "parquet", tmp_path / "same.parquet")
+    assert (tmp_path / "same.parquet").read_bytes() == (other / "solution.parquet").read_bytes()
