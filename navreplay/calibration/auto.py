@@ -29,6 +29,7 @@ from navreplay.calibration.linear_log import (
     LinearLog,
     adjoin,
     correlate,
+    correlate_anew,
     delete,
     hold_sources,
     log_likelihood,
@@ -181,10 +182,12 @@ def _try_correlation(logs: Sequence[LinearLog], found: Found, kind: Kind) -> tup
 
     def misfit(x: Floats) -> float:
         """Minus the log-likelihood, with the logarithm x[0] of a factor on R of that kind."""
-        wider = [correlate(one, CorrelatedErrors((build(x),))) for one in known]
-        noises = [scale_rows(one, one.by_kind({kind: exp(x[0])})) for one in wider]
+        errors = CorrelatedErrors((build(x),))
+        wider = [correlate_anew(one, wide, errors) for one, wide in zip(known, first, strict=True)]
+        noises = [scale_rows(one, one.by_kind({kind: exp(x[0])})) for one in known]
         return -sum(log_likelihood(one, one.rest, noise) for one, noise in zip(wider, noises, strict=True))
 
+    first = [correlate(one, CorrelatedErrors((build(np.zeros(3)),))) for one in known]
     # next to nothing that stays
     white = minimize_scalar(lambda factor: misfit(np.array([factor, -30.0, 0.0])), bracket=(-0.5, 0.5), tol=1e-3).fun
     step = float(np.median(np.concatenate([np.diff(one.t_ns) for one in known]))) / 1e9

@@ -24,6 +24,7 @@ __all__ = [
     "LinearLog",
     "adjoin",
     "correlate",
+    "correlate_anew",
     "delete",
     "hold_sources",
     "log_likelihood",
@@ -160,6 +161,16 @@ def correlate(log: LinearLog, errors: CorrelatedErrors) -> LinearLog:
         corrections=np.hstack([log.corrections, np.zeros((k, c))]),
         jacobian=np.hstack([log.jacobian, errors.jacobian(log.labels)]),
     )
+
+
+def correlate_anew(log: LinearLog, wide: LinearLog, errors: CorrelatedErrors) -> LinearLog:
+    """What `correlate` makes of the log, from wide, which it made for errors of the same kinds: only what depends on their
+    size and time is made again."""
+    dt = np.diff(log.t_ns, prepend=log.start_ns) / 1e9
+    n = log.corrections.shape[1]
+    transitions, rest = wide.transitions.copy(), wide.rest.copy()
+    transitions[:, n:, n:], rest[:, n:, n:] = errors.transitions(dt), errors.noises(dt)
+    return replace(wide, start=errors.enter(log.start), transitions=transitions, rest=rest)
 
 
 def delete(log: LinearLog, found: Adjoints, noise: Floats, told: Floats, rows: np.ndarray) -> tuple[Floats, Floats]:

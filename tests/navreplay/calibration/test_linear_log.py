@@ -13,12 +13,22 @@ import synthetic_logs
 from navreplay.adapt.fixed import Fixed
 from navreplay.calibration import _chain_kernel, _linear_kernel
 from navreplay.calibration.em_offline import improve_factors, maximise_likelihood
-from navreplay.calibration.linear_log import LinearLog, adjoin, delete, log_likelihood, process_noise, scale_rows
+from navreplay.calibration.linear_log import (
+    LinearLog,
+    adjoin,
+    correlate,
+    correlate_anew,
+    delete,
+    log_likelihood,
+    process_noise,
+    scale_rows,
+)
 from navreplay.calibration.noise_levels import Chain, find_levels, ratios_of
+from navreplay.error_models.correlated_error import CorrelatedErrors
 from navreplay.filters.presets import build_method
 from navreplay.filters.run import run_filter
 from navreplay.geodesy import earth
-from navreplay.options import FilterOptions, GateOptions
+from navreplay.options import CorrelatedNoise, FilterOptions, GateOptions
 from navreplay.timeline import LogError, Timeline
 
 TRANSITION = np.array([[1.0, 1.0], [0.0, 0.9]])
@@ -118,6 +128,26 @@ def test_compiled_passes_equal_their_source():
     np.testing.assert_allclose(holds, found.holds, atol=1e-12)
     np.testing.assert_allclose(state_pulls, found.state_pulls, atol=1e-12)
     np.testing.assert_allclose(state_holds, found.state_holds, atol=1e-12)
+
+
+def test_a_log_correlated_anew_is_the_log_correlated():
+    n = 15
+    rng = np.random.default_rng(4)
+    known = draw_log(4, 20, {"push": 1.0, "position": 1.0, "velocity": 1.0})
+    k = len(known.t_ns)
+    known = replace(
+        known,
+        start=np.eye(n),
+        transitions=rng.standard_normal((k, n, n)),
+        rest=rng.standard_normal((k, n, n)),
+        sources={},
+        corrections=np.zeros((k, n)),
+        jacobian=rng.standard_normal((len(known.residual), n)),
+    )
+    first, second = (CorrelatedErrors((CorrelatedNoise("position", std, time),)) for std, time in (((1, 2), 3), ((4, 5), 6)))
+    plain, anew = correlate(known, second), correlate_anew(known, correlate(known, first), second)
+    for name in ("start", "transitions", "rest", "jacobian", "corrections", "told"):
+        assert np.array_equal(getattr(plain, name), getattr(anew, name)), name
 
 
 def test_gain_of_a_step_is_the_gradient_of_the_likelihood():
