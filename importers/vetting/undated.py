@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import fftconvolve
 
 from importers.findings import Finding
 from importers.rows.clock import NOMINAL_NS, is_nominal
@@ -83,6 +82,8 @@ def _course_rate(fixes: GnssFixSeries) -> tuple[Floats, NDArray[np.bool_]]:
 
 def _match(turns: Floats, course: Floats, moving: NDArray[np.bool_]) -> tuple[int, float, float]:
     """Cells that the turns begin behind the course's first, the correlation there, and the best at least 5 s elsewhere."""
+    from scipy.signal import fftconvolve  # slow to load, and hardly any log needs it
+
     known = np.ones(len(turns))
     together = fftconvolve(moving.astype(np.float64), known[::-1])
     product = fftconvolve(course, turns[::-1])
