@@ -78,7 +78,10 @@ _SCALARS = {
     "speed": r"(ground|g)?speed|sog|speedoverground",
     "course": r"course|cog|track|headingofmotion|headmot|courseoverground",
     "std_h": r"(h|horizontal)(acc|accuracy)|eph",
-    "std_d": r"(v|vertical)(acc|accuracy)|epv",
+    "std_d": r"(v|vertical)(acc|accuracy)|epv|(std|sd|sigma)(d|down|u|up|h|height|alt|altitude)|"
+    r"(height|alt|altitude|up)(std|stdev|sd|sigma)",
+    "std_n": r"(std|sd|sigma)(n|north|lat|latitude)|(lat|latitude|north)(std|stdev|stddev|sd|sigma)",
+    "std_e": r"(std|sd|sigma)(e|east|lon|longitude)|(lon|longitude|east)(std|stdev|stddev|sd|sigma)",
 } | {
     f"{kind}_{axis}": rf"({names})({axis}|axis{axis})"
     for axis in "xyz"
@@ -147,7 +150,18 @@ def guess_quantities(fields: Mapping[str, Floats]) -> dict[str, Guess]:
         if along is not None:
             told = unit or _unit_of(along[0], values)
             found.setdefault(along[0], Guess(path, told, _reason(path, values, told), along[1]))
-    return _with_family_units(found, fields)
+    return _with_receiver_units(_with_family_units(found, fields), fields)
+
+
+def _with_receiver_units(found: dict[str, Guess], fields: Mapping[str, Floats]) -> dict[str, Guess]:
+    """Whole accuracies beside latitudes in 1e-7 degrees are millimetres, as receivers count both."""
+    if "lat" not in found or found["lat"].unit != "1e-7 deg":
+        return found
+    for name in [name for name in found if name.startswith("std") and not _names_and_unit(found[name].path)[1]]:
+        values = np.nan_to_num(fields[found[name].path])
+        if np.all(values == np.rint(values)):
+            found[name] = replace(found[name], unit="mm", reason=_reason(found[name].path, values, "mm"))
+    return found
 
 
 def _direction(names: list[str]) -> tuple[str, bool] | None:
@@ -201,7 +215,7 @@ def _unit_of(quantity: str, values: Floats) -> str:
         return "g" if 0.5 < size < 1.5 else "mg" if 500 < size < 1500 else "m/s2"
     if family == "speed":  # no vehicle on a road or in the air does 500 m/s
         return "mm/s" if whole and (size > 200 or float(np.nanmax(np.abs(values))) > 500) else "m/s"
-    return "mm" if whole and (size > 20_000 or quantity.startswith("std")) else "m"
+    return "mm" if whole and size > (500 if quantity.startswith("std") else 20_000) else "m"
 
 
 def _with_family_units(found: dict[str, Guess], fields: Mapping[str, Floats]) -> dict[str, Guess]:

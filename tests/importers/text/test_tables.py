@@ -270,3 +270,11 @@ def test_columns_of_letters_tell_the_hemisphere(tmp_path):
     (tmp_path / "a.csv").write_text("unix,latitude,N/S,longitude,E/W,alt\n" + rows)
     fixes = load_timeline([tmp_path / "a.csv"]).fixes
     np.testing.assert_allclose(np.degrees(fixes.lla[0, :2]), [-12.5, -8.25])
+
+
+@pytest.mark.parametrize(("accuracy", "std"), [("2", 2.0), ("0.014", 0.014), ("2100", 2.1)])
+def test_accuracies_by_name_are_metres_unless_their_size_says_otherwise(tmp_path, accuracy, std):
+    rows = "".join(f"{1_700_000_000 + i},48.{i:02d},11.6,10.5,{accuracy},{accuracy},{accuracy}\n" for i in range(30))
+    (tmp_path / "a.csv").write_text("unix,lat,lon,alt,std_n,std_e,std_u\n" + rows)
+    fixes = load_timeline([tmp_path / "a.csv"]).fixes
+    np.testing.assert_allclose(np.sqrt(fixes.cov_pos[0, 0, 0]), std)
