@@ -28,8 +28,9 @@ def carry(transitions, noises, q_scales, beyond_told, covariances, means, covs):
 
 
 @njit(cache=True)
-def update(residual, jacobian, noises, means, covs, log_likelihood):  # type: ignore[no-untyped-def]
+def update(residual, jacobian, noises, estimated, means, covs, log_likelihood):  # type: ignore[no-untyped-def]
     """Updates M hypotheses by residual (m,), which the nominal state has left, with jacobian (m, n) and noises (M, m, m).
+    States behind the first `estimated` are biases that are considered: they move by nothing and keep their covariance.
 
     Changed: means (M, n), covs (M, n, n); filled: log_likelihood (M,) but for a constant. Returns whether every S is positive
     definite; where not, what is changed means nothing.
@@ -61,11 +62,11 @@ def update(residual, jacobian, noises, means, covs, log_likelihood):  # type: ig
             total += 2 * np.log(spread[i, i]) + white[i, n] ** 2
         log_likelihood[h] = -total / 2
         for i in range(n):
-            for k in range(m):
+            for k in range(m if i < estimated else 0):
                 means[h, i] += white[k, i] * white[k, n]
             for j in range(i + 1):
                 value = (covs[h, i, j] + covs[h, j, i]) / 2
-                for k in range(m):
+                for k in range(m if j < estimated else 0):
                     value -= white[k, i] * white[k, j]
                 covs[h, i, j] = covs[h, j, i] = value
     return True

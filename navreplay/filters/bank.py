@@ -32,7 +32,7 @@ from navreplay.update.record import Recorder
 from navreplay.update.reopening import LossWatch, tell_widening, widen
 from navreplay.update.verdict import EpochGate
 
-__all__ = ["Bank", "Stack", "Update", "mix", "move_stack", "update_stack"]
+__all__ = ["Bank", "Stack", "Update", "interact", "mix", "move_stack", "update_stack"]
 
 _LEADS = 0.9
 """Weight above which a hypothesis is told to lead."""
@@ -64,6 +64,16 @@ def _average(weights: Floats, matrices: Floats) -> Floats:
     return np.asarray((weights @ matrices.reshape(len(weights), -1)).reshape(matrices.shape[1:]))
 
 
+def interact(stack: Stack, weights: Floats, transitions: Floats) -> tuple[Stack, Floats]:
+    """The hypotheses and their weights (M,) where the right one changes with probabilities transitions (M, M), row to column:
+    each goes on from the mixture of those that it may have followed, weighted by how likely it followed each (Blom and
+    Bar-Shalom 1988, eqs. 3.2 to 3.5). The moments of the mixture over all stay what they are."""
+    joint = weights[:, None] * transitions
+    follows = joint.sum(axis=0)
+    parts = [mix(stack, joint[:, j] / follows[j]) for j in range(len(follows))]
+    return Stack(np.array([part.mean for part in parts]), np.array([part.cov for part in parts])), follows
+
+
 def move_stack(stack: Stack, moved: Propagated, q_scales: Floats, weights: Floats) -> Stack:
     """The hypotheses behind the last node of moved, each with its own multiple q_scales (M,) of the noise. The covariances of
     moved, which is the mixture's with told noise, become those of the mixture with weights (M,)."""
@@ -73,14 +83,15 @@ def move_stack(stack: Stack, moved: Propagated, q_scales: Floats, weights: Float
     return Stack(means, covs)
 
 
-def update_stack(prior: Stack, residual: Floats, jacobian: Floats, noises: Floats) -> Update:
+def update_stack(prior: Stack, residual: Floats, jacobian: Floats, noises: Floats, estimated: int) -> Update:
     """Every hypothesis given residual (m,) = H x + v against the nominal, jacobian H (m, n), by its own R of noises (M, m, m).
 
     With S = L L' and W = L^-1 H P the posterior P - W' W is that of the Joseph form (11) at the optimal gain, symmetric as it
-    stands; likelihood (14). Raises LogError where an S is not positive definite.
+    stands; likelihood (14). States behind the first `estimated` are biases that a Schmidt-Kalman filter considers: a gain of
+    zero for them leaves P_pp, and what is above for all else. Raises LogError where an S is not positive definite.
     """
     means, covs, log_likelihood = prior.means.copy(), prior.covs.copy(), np.empty(len(noises))
-    if not _bank_kernel.update(residual, jacobian, noises, means, covs, log_likelihood):
+    if not _bank_kernel.update(residual, jacobian, noises, estimated, means, covs, log_likelihood):
         raise LogError(
             "filter: the covariance of an innovation is not positive definite; are the scales of the bank plausible?"
         )
@@ -91,14 +102,23 @@ class Bank:
     """The estimator of a bank, with one kind of aiding. Keeps hypotheses, their adapters, the weights, and the record."""
 
     def __init__(
-        self, aiding: Aiding, gate: EpochGate, model: ErrorModel, method: Method, weighting: Mmae, recorder: Recorder
+        self,
+        aiding: Aiding,
+        gate: EpochGate,
+        model: ErrorModel,
+        method: Method,
+        weighting: Mmae,
+        recorder: Recorder,
+        estimated: int,
     ) -> None:
+        """estimated: so many states of the model, from the first on, are estimated; those behind them are considered."""
         self._aiding = aiding
         self._gate = gate
         self._model = model
         self._method = method
         self._weighting = weighting
         self._recorder = recorder
+        self._estimated = estimated
         self._q_scales, self._r_scales = np.array(weighting.hypotheses()).T
         self._labels = weighting.labels()
         size = len(self._labels)
@@ -108,6 +128,7 @@ class Bank:
         self._weights = weighting.start(0)
         self._mixed: Floats | None = None
         self._leader = ""
+        self._last_ns: int | None = None
         self._zero = np.zeros(model.size)
         self._watch = LossWatch()
 
@@ -155,9 +176,18 @@ class Bank:
         self._leave(t_ns, innovation.labels, measurement, stack.means)
         posterior = mix(stack, self._weights.values)
         self._stack = stack._replace(means=stack.means - posterior.mean)
+        self._interact(t_ns)
         moved = self._model.retract(state, posterior.mean)
         self._mixed = symmetric(posterior.cov)
         return Updated(moved, self._mixed, state, mixture.cov, RowStatus.UPDATED, observed, lost)
+
+    def _interact(self, t_ns: int) -> None:
+        """What may have changed in the interval between the epoch before and that at t_ns; likewise in the one to come."""
+        before, self._last_ns = self._last_ns, t_ns
+        transitions = None if before is None else self._weighting.transitions((t_ns - before) / 1e9)
+        if transitions is not None:
+            self._stack, follows = interact(self._stack, self._weights.values, transitions)
+            self._weights = self._weights._replace(logs=np.log(follows))
 
     def _condition(self, t_ns: int, prior: Stack, measurement: Measurement, noises: Floats, passed: np.ndarray) -> Stack:
         """The hypotheses given the components with index passed (k,), and weighed by those of them that a sensor has measured:
@@ -166,7 +196,7 @@ class Bank:
         for rows, weighs in ((passed[measured], True), (passed[~measured], False)):
             if len(rows):
                 part = measurement.residual[rows], measurement.jacobian[rows], noises[:, rows[:, None], rows]
-                stack, log_likelihood = update_stack(stack, *part)
+                stack, log_likelihood = update_stack(stack, *part, self._estimated)
                 if weighs:
                     self._weigh(t_ns, log_likelihood)
         return stack

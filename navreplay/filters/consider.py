@@ -142,7 +142,8 @@ class Setup(NamedTuple):
     def estimator(self, gate: EpochGate, recorder: Recorder) -> Estimator:
         """A filter at the start of a stretch."""
         if self.method.weighting is not None:
-            return Bank(self.aiding, gate, self.model, self.method, self.method.weighting, recorder)
+            estimated = self.model.inner.size if isinstance(self.model, ConsideredModel) else self.model.size
+            return Bank(self.aiding, gate, self.model, self.method, self.method.weighting, recorder, estimated)
         tracking = self.method.tracking
         if tracking is None or not isinstance(self.model, ConsideredModel):
             return Updater(self.aiding, gate, self.model, self.method, recorder)
@@ -155,13 +156,13 @@ def check_considers(method: Method, options: FilterOptions) -> None:
         return
     if not _can_consider(method):
         raise LogError(
-            f"filter: consider parameters need a single linearised filter, which '{method.name}' is not; set "
+            f"filter: consider parameters need linearised filters, which '{method.name}' is not; set "
             "consider.every_method = false, or take 'eckf'"
         )
 
 
 def _can_consider(method: Method) -> bool:
-    return isinstance(method.rule, Linearised) and method.weighting is None
+    return isinstance(method.rule, Linearised)
 
 
 def set_up(aiding: Aiding, model: ErrorModel, method: Method, options: FilterOptions) -> Setup:

@@ -27,7 +27,7 @@ from navreplay.calibration.auto import Auto
 from navreplay.calibration.em_offline import EmOffline
 from navreplay.calibration.review import Review
 from navreplay.calibration.settled import Calibration
-from navreplay.filters.weights import Immae, Mmae, MmaeFloor
+from navreplay.filters.weights import Imm, Immae, Mmae, MmaeFloor
 from navreplay.moments.cubature import Cubature
 from navreplay.moments.invariant import Invariant
 from navreplay.moments.linearised import Linearised, MomentRule
@@ -142,7 +142,11 @@ PRESETS: dict[str, Preset | BankPreset] = {
         Preset("vb", "R by variational Bayes (Särkkä and Nummenmaa 2009)", VariationalBayes),
         Preset("ml", "R of greatest likelihood over a window, by SQP (Gao et al. 2021)", MaximumLikelihood),
         Preset("ml-ga", "the same by differential evolution, slow (Gao et al. 2021)", GeneticLikelihood),
-        Preset("em-kf", "P and R by expectation maximisation at each epoch (Lai et al. 2022)", Em),
+        Preset(
+            "em-kf",
+            "R by expectation maximisation at each epoch, P too from two iterations on (Lai et al. 2022)",
+            Em,
+        ),
         Preset("em-kf-printed", "the same with equation (30) as printed", PrintedEm),
         Preset("em-offline", "R and Q by expectation maximisation over the whole log", Fixed, calibration=EmOffline),
         Preset("auto", "noise as the whole log shows it: scale, steps, heavy tails, errors that stay", Fixed, calibration=Auto),
@@ -160,6 +164,7 @@ PRESETS: dict[str, Preset | BankPreset] = {
         Preset("ermakf-whitened", "ermakf-derived with R enlarged for noise that stays", ErmakfWhitened),
         BankPreset("mmae", "bank of filters with scaled Q or R, weighted by likelihood (Magill 1965)", Mmae),
         BankPreset("mmae-floor", "the same with a floor under the weights (Maybeck 1982)", MmaeFloor),
+        BankPreset("imm", "the same, hypotheses that follow one another with told probability (Blom and Bar-Shalom 1988)", Imm),
         BankPreset("immae", "the same, weights made even when recent measurements contradict them (Si et al.)", Immae),
     )
 }

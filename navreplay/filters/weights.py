@@ -3,7 +3,8 @@
 Source: Magill, Optimal adaptive estimation of sampled stochastic processes, IEEE Trans. Automatic Control 10 (1965) 434, for
 `Mmae`; Maybeck, Stochastic Models, Estimation, and Control 2 (1982), 10.8, for `MmaeFloor`; Si, Wang and Niu, High precision
 attitude estimation algorithm for SINS/CNS integrated navigation with unknown noise characteristics, eqs. (14)-(16) and
-step (5), for `Immae`.
+step (5), for `Immae`; Blom and Bar-Shalom, The interacting multiple model algorithm, IEEE Trans. Automatic Control 33 (1988)
+780, for `Imm`.
 w_k = L_k w_k-1 / sum(L_k w_k-1), in logarithms, with L the Gaussian likelihood of the innovation. As printed, (15) and (16)
 are one recursion, and the second could never differ from the first: here the second starts from 1 / M at every assessment
 interval, so that it holds the last interval and the first the whole history, which is what step (5) compares.
@@ -22,7 +23,7 @@ import numpy as np
 
 from navreplay.timeline import Floats
 
-__all__ = ["Hypothesis", "Immae", "Mmae", "MmaeFloor", "Weights"]
+__all__ = ["Hypothesis", "Imm", "Immae", "Mmae", "MmaeFloor", "Weights"]
 
 
 class Hypothesis(NamedTuple):
@@ -76,6 +77,11 @@ class Mmae:
         """The weights after an epoch at t_ns with log_likelihood (M,)."""
         return weights._replace(logs=_normalise(weights.logs + log_likelihood))
 
+    def transitions(self, seconds: float) -> Floats | None:
+        """(M, M) the probabilities that the hypothesis of a row has given way to that of a column after so many seconds; None
+        where one of them is right all the time."""
+        return None
+
 
 @dataclass(frozen=True, slots=True)
 class MmaeFloor(Mmae):
@@ -87,6 +93,22 @@ class MmaeFloor(Mmae):
         """The weights after an epoch at t_ns with log_likelihood (M,)."""
         logs = _normalise(weights.logs + log_likelihood)
         return weights._replace(logs=_normalise(np.maximum(logs, np.log(self.floor))))
+
+
+@dataclass(frozen=True, slots=True)
+class Imm(Mmae):
+    """The right hypothesis changes: one holds for sojourn [s] in the mean, and each of the others is as likely to follow it."""
+
+    sojourn: float = 60.0
+
+    def transitions(self, seconds: float) -> Floats:
+        """(M, M) the probabilities that the hypothesis of a row has given way to that of a column after so many seconds."""
+        size = len(self.hypotheses())
+        if size == 1:
+            return np.ones((1, 1))
+        # of the chain whose rates out of a hypothesis are 1 / sojourn in all
+        fades = np.exp(-seconds / self.sojourn * size / (size - 1))
+        return np.asarray(fades * np.eye(size) + (1 - fades) / size)
 
 
 @dataclass(frozen=True, slots=True)

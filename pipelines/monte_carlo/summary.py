@@ -294,7 +294,8 @@ def _conclude(orders: Sequence[dict[str, Any]], explanations: Sequence[dict[str,
         whole = "holds" if held == len(verdicts) else "does not hold as a whole"
         sentences.append(
             f"The published order in '{stretch}' {whole}: of {len(verdicts)} comparisons {held} hold, {contradicted} are "
-            f"contradicted and {open_} are undecided (paired differences over {seeds} seeds, 95 %)."
+            f"contradicted and {open_} are undecided (paired differences over {seeds} seeds, 95 %). Were all arms alike, "
+            f"chance would decide {0.05 * len(verdicts):.2g} of them."
         )
     for explanation in explanations:
         state = "holds" if explanation["holds"] else "does not hold"

@@ -11,10 +11,10 @@ import synthetic_logs
 from navreplay.error_models.ned import Propagated
 from navreplay.evaluation.metrics import evaluate
 from navreplay.filters import _bank_kernel
-from navreplay.filters.bank import Stack, mix, move_stack, update_stack
+from navreplay.filters.bank import Stack, interact, mix, move_stack, update_stack
 from navreplay.filters.presets import build_method
 from navreplay.filters.run import run_filter
-from navreplay.filters.weights import Immae, Mmae, MmaeFloor
+from navreplay.filters.weights import Imm, Immae, Mmae, MmaeFloor
 from navreplay.moments.linearised import Linearised
 from navreplay.options import FilterOptions
 from navreplay.solution import Solution
@@ -29,7 +29,7 @@ from pipelines.report.figures import report_plots
 from tests.navreplay.adapt.test_adapter_consistency import NOISE, OBSERVATION, PROCESS_NOISE, START, TRANSITION
 from tests.pipelines.recording.test_view import read_entity
 
-BANKS = ("mmae", "mmae-floor", "immae")
+BANKS = ("mmae", "mmae-floor", "imm", "immae")
 SECOND = 1_000_000_000
 
 
@@ -80,6 +80,34 @@ def test_the_mixture_of_two_models_is_that_worked_out_by_hand():
     np.testing.assert_allclose(mixed.cov, [[7.0 + 0.75, 0.25 - 0.75], [0.25 - 0.75, 3.5 + 0.75]], rtol=1e-15)
 
 
+@given(st.integers(0, 10_000), st.floats(0.01, 1000.0))
+def test_interaction_keeps_the_moments_of_the_mixture(seed, seconds):
+    rng = np.random.default_rng(seed)
+    roots, weights = rng.normal(size=(3, 4, 4)), rng.dirichlet(np.ones(3))
+    stack = Stack(rng.normal(size=(3, 4)), roots @ np.swapaxes(roots, 1, 2))
+    moves = Imm(q_scales=(1.0, 2.0, 3.0), sojourn=20.0).transitions(seconds)
+    np.testing.assert_allclose(moves.sum(axis=1), 1, rtol=1e-12)
+    before, after = mix(stack, weights), mix(*interact(stack, weights, moves))
+    np.testing.assert_allclose(after.mean, before.mean, atol=1e-12)
+    np.testing.assert_allclose(after.cov, before.cov, atol=1e-11)
+
+
+def test_the_probability_to_stay_is_that_of_the_mean_sojourn():
+    """Over a short time 1 - t / sojourn, the rest shared; two intervals are one of their sum; in the end all are even."""
+    chain = Imm(q_scales=(1.0, 2.0, 3.0), sojourn=50.0)
+    np.testing.assert_allclose(
+        chain.transitions(0.05), [[0.999, 5e-4, 5e-4], [5e-4, 0.999, 5e-4], [5e-4, 5e-4, 0.999]], atol=2e-6
+    )
+    np.testing.assert_allclose(chain.transitions(3.0) @ chain.transitions(4.0), chain.transitions(7.0), rtol=1e-12)
+    np.testing.assert_allclose(chain.transitions(1e5), 1 / 3, rtol=1e-12)
+
+
+def test_imm_that_never_switches_is_mmae():
+    timeline, options = drive("car-short", 40.0)
+    plain = run_filter(timeline, build_method("mmae"), options)
+    assert_same(run_filter(timeline, build_method("imm", {"sojourn": 1e15}), options), plain, 1e-6)
+
+
 @given(st.integers(0, 10_000))
 def test_every_hypothesis_is_updated_as_a_filter_of_its_own(seed):
     rng = np.random.default_rng(seed)
@@ -87,7 +115,7 @@ def test_every_hypothesis_is_updated_as_a_filter_of_its_own(seed):
     stack = Stack(rng.normal(size=(3, 4)), roots @ np.swapaxes(roots, 1, 2) + np.eye(4))
     noises = noise_roots @ np.swapaxes(noise_roots, 1, 2) + np.eye(2)
     residual, jacobian = rng.normal(size=2), rng.normal(size=(2, 4))
-    updated = update_stack(stack, residual, jacobian, noises)
+    updated = update_stack(stack, residual, jacobian, noises, 4)
     squares = []
     for j, (mean, cov) in enumerate(zip(*stack, strict=True)):
         innovation = Linearised().innovate(Gaussian(mean, cov), z_of(residual, jacobian, noises[j]))
@@ -190,7 +218,7 @@ def track(weighting: Mmae, seed: int, epochs: int, true_scale: float = 1.0) -> t
         residual = OBSERVATION @ (true - nominal) + roots[2] @ rng.normal(size=6)
         prior, noise = mix(stack, weights.values), NOISE * (weights.values @ r_scales)
         nis.append(chi_square(residual, OBSERVATION @ prior.cov @ OBSERVATION.T + noise) / 6)
-        stack, log_likelihood = update_stack(stack, residual, OBSERVATION, NOISE * r_scales[:, None, None])
+        stack, log_likelihood = update_stack(stack, residual, OBSERVATION, NOISE * r_scales[:, None, None], 6)
         weights = weighting.weigh(weights, epoch * SECOND, log_likelihood)
         now = mix(stack, weights.values)
         nominal, stack = nominal + now.mean, stack._replace(means=stack.means - now.mean)
@@ -268,8 +296,8 @@ def test_compiled_kernels_are_their_python_selves():
     for carry, update in ((_bank_kernel.carry, _bank_kernel.update), (_bank_kernel.carry.py_func, _bank_kernel.update.py_func)):
         m, p, mixture, likelihood = means.copy(), covs.copy(), np.zeros((3, 4, 4)), np.empty(2)
         carry(steps, np.tile(np.eye(4), (3, 1, 1)), np.array([1.0, 5.0]), 0.7, mixture, m, p)
-        assert update(residual, jacobian, noises, m, p, likelihood)
-        assert not update(residual, jacobian, -1e3 * noises, m.copy(), p.copy(), np.empty(2))
+        assert update(residual, jacobian, noises, 3, m, p, likelihood)
+        assert not update(residual, jacobian, -1e3 * noises, 3, m.copy(), p.copy(), np.empty(2))
         outcomes.append((m, p, mixture, likelihood))
     for compiled, plain in zip(*outcomes, strict=True):
         np.testing.assert_allclose(compiled, plain, rtol=1e-9, atol=1e-9)

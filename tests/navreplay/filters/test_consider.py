@@ -4,12 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import synthetic_logs
 from navreplay.adapt.inflation.partial_tracking import PartialTracking
 from navreplay.error_models.considered import ConsideredModel
 from navreplay.error_models.ned import NedErrorModel
 from navreplay.evaluation.metrics import evaluate
+from navreplay.filters.bank import Stack, update_stack
 from navreplay.filters.consider import Schmidt
 from navreplay.filters.presets import PRESETS, Preset, build_method
 from navreplay.filters.run import run_filter
@@ -317,11 +320,23 @@ def test_a_considered_bias_of_nothing_smooths_like_none(log) -> None:
     np.testing.assert_allclose(with_biases.cov[:, :n, :n] / scale, without.cov / scale, atol=1e-6)
 
 
-def test_a_bank_is_refused(log):
-    with pytest.raises(
-        LogError, match=r"consider parameters need a single linearised filter, which 'mmae' is not; set consider"
-    ):
-        run_filter(log.timeline(), build_method("mmae"), options(consider=replace(ALL_BIASES, every_method=True)))
+@pytest.mark.parametrize("inner", ["fixed", "student-t"])
+def test_a_bank_of_one_considers_as_the_single_filter_does(log, ranges, inner):
+    for one, biases in ((log, replace(ALL_BIASES, zenith_delay=0.0)), (ranges, ALL_BIASES)):
+        chosen = options(consider=replace(biases, every_method=True))
+        plain = run_filter(one.timeline(), build_method(inner), chosen)
+        bank = run_filter(one.timeline(), build_method("mmae", {"q_scales": [1.0], "inner": inner}), chosen)
+        assert_equal(bank, plain, 1e-4, len(plain.state_names))
+
+
+@given(st.integers(0, 10_000))
+def test_every_hypothesis_is_updated_as_a_schmidt_filter_of_its_own(seed):
+    prior, z = draw_problem(seed)
+    rule = Schmidt(Linearised(), 7, np.diagonal(prior.cov)[7:])
+    expected = rule.condition(prior, rule.innovate(prior, z), z.noise)
+    updated = update_stack(Stack(prior.mean[None], prior.cov[None]), z.residual, z.jacobian, z.noise[None], 7)
+    np.testing.assert_allclose(updated.stack.means[0], expected.mean, atol=1e-9)
+    np.testing.assert_allclose(updated.stack.covs[0], expected.cov, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", ["em-offline", "auto"])
