@@ -35,7 +35,7 @@ def find_set_up(timeline: Timeline, config: Config) -> tuple[Timeline, float, tu
     if ahead is not None and plain and config.alignment.forward_deg is None:
         forward, findings = ahead.angle, (_tell_forward(ahead.angle),)
     moved, told = settle_time_offset(seen, match, options_of(config, forward))
-    return replace(timeline, imu=moved.imu), forward, (*findings, *told)
+    return timeline if moved is seen else replace(timeline, imu=moved.imu), forward, (*findings, *told)
 
 
 def _with_points(timeline: Timeline, config: Config) -> Timeline:

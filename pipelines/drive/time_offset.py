@@ -27,6 +27,9 @@ _STEP_S = 0.08
 _FINEST_S = 0.005
 _BETTER = 0.9
 """Of the misfit without an offset: a better one must stay below this share of it."""
+_REFUTED = 2.5
+"""Misfit that refutes the told noise as well."""
+_FLOOR_M = 0.5
 _CAP = 25.0
 """Of a normalised square: what an outlier counts at most."""
 
@@ -39,6 +42,10 @@ def settle_time_offset(timeline: Timeline, match: YawMatch, options: FilterOptio
     trial = _Trial(timeline, options)
     untouched = trial.misfit(0.0)
     offset, misfit = _search(trial, match.offset_s)
+    if untouched > _REFUTED and not misfit < _BETTER * untouched:  # too sure by far: as all innovations are capped, none tells
+        trial = _Trial(_with_floor(timeline), options)
+        untouched = trial.misfit(0.0)
+        offset, misfit = _search(trial, match.offset_s)
     if not misfit < _BETTER * untouched or abs(offset) < _DOUBTFUL_S / 2:
         return timeline, ()
     text = (
@@ -55,6 +62,13 @@ def shift_imu(timeline: Timeline, offset_s: float) -> Timeline:
     """The timeline with offset_s [s] added to the IMU's stamps."""
     assert timeline.imu is not None
     return replace(timeline, imu=replace(timeline.imu, t_ns=timeline.imu.t_ns + round(offset_s * 1e9)))
+
+
+def _with_floor(timeline: Timeline) -> Timeline:
+    """The timeline with positions told no better than half a metre, as stamps that jitter make them."""
+    assert timeline.fixes is not None
+    cov_pos = timeline.fixes.cov_pos + _FLOOR_M**2 * np.eye(3)
+    return replace(timeline, fixes=replace(timeline.fixes, cov_pos=cov_pos))
 
 
 class _Trial:

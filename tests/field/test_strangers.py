@@ -26,12 +26,7 @@ def test_the_promise_holds_for_some_strangers(name: str, tmp_path: Path) -> None
     check(name, tmp_path)
 
 
-OPEN = {"late_and_jittering": "told to centimetres, the noise hides the delay from the trials of a time offset"}
-"""Kinds whose promise is not kept yet, though the verdict on them is poor, and why."""
-ALL = [pytest.param(name, marks=pytest.mark.xfail(reason=OPEN[name])) if name in OPEN else name for name in KINDS]
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("name", KINDS)
 def test_the_promise_holds_for_every_stranger(name: str, tmp_path: Path) -> None:
     check(name, tmp_path)
