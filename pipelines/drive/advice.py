@@ -95,6 +95,8 @@ def _candidates(timeline: Timeline, config: Config, solution: Solution) -> Itera
     yield from (_Candidate(f"imu.grade={grade}") for grade in _neighbours(config.imu.grade))
     if not config.vehicle.options().zero_velocity:
         yield _Candidate("vehicle.zero_velocity=true")
+    if config.vehicle.kind == "unknown":
+        yield _Candidate("vehicle.kind=car")
     for shift in _OFFSETS_S:
         yield _Candidate(f"input.imu.time_offset_s={config.input.imu.time_offset_s + shift:+.3g}", shift)
     lever = timeline.fix_lever_b + _arm_left(timeline, solution)
