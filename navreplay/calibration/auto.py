@@ -42,7 +42,7 @@ from navreplay.error_models.correlated_error import CorrelatedErrors
 from navreplay.options import CorrelatedNoise, FilterOptions, GateOptions
 from navreplay.timeline import Floats
 
-__all__ = ["Auto"]
+__all__ = ["Auto", "carry_over"]
 
 _SOURCES = ("gyro_noise", "accel_noise", "horizontal", "vertical")
 """Process noises that are asked for; the walk of a bias shows too little of itself in one log."""
@@ -83,8 +83,10 @@ class Auto:
         found = Found({}, (), tuple(one.by_kind(kinds) for one in logs))
         for _ in range(self.passes):
             means = _mean_ratios(logs, found.ratios)
+            before = logs
             logs = trace(_apply(options, found, means, False), _prescribe(logs, found.ratios, means), _SOURCES)
             logs = tuple(_told_first(one, means, found.sources) for one in logs)
+            found = replace(found, ratios=carry_over(before, found.ratios, logs, means))
             found = _find_levels(logs, _find_correlation(logs, _find_sources(logs, found)))
         means = _mean_ratios(logs, found.ratios)
         chosen = _apply(options, found, means, True)
@@ -102,6 +104,21 @@ def _mean_ratios(logs: Sequence[LinearLog], ratios: Sequence[Floats]) -> Factors
             if kind in one.rows_by_kind:
                 rows.setdefault(kind, []).append(part[one.rows_by_kind[kind]])
     return {kind: max(float(np.concatenate(parts).mean()), _LEAST.get(kind, 0.0)) for kind, parts in rows.items()}
+
+
+def carry_over(
+    before: Sequence[LinearLog], ratios: Sequence[Floats], logs: Sequence[LinearLog], means: Factors
+) -> tuple[Floats, ...]:
+    """The ratios (r,) of each of logs, by those of a pass before: one that lost its way was started anew, and has other
+    stretches and epochs than one that did not. What it did not see has the mean of its kind."""
+    known: dict[tuple[int, str], float] = {}
+    for one, part in zip(before, ratios, strict=True):
+        known |= zip(zip(one.t_ns[one.epochs].tolist(), one.labels, strict=True), part.tolist(), strict=True)
+    carried = []
+    for one in logs:
+        rows = zip(one.t_ns[one.epochs].tolist(), one.labels, one.by_kind(means).tolist(), strict=True)
+        carried.append(np.array([known.get((t_ns, label), mean) for t_ns, label, mean in rows]))
+    return tuple(carried)
 
 
 def _apply(options: FilterOptions, found: Found, means: Factors, correlated: bool) -> FilterOptions:

@@ -20,6 +20,7 @@ _BANKS = (
     Arm("MMAE", "mmae"),
     Arm("IMMAE", "immae"),
     Arm("mmae-floor", "mmae-floor"),
+    Arm("IMM", "imm"),
 )
 _WHOLE = Stretch("whole flight", ((0.0, 600.0),))
 _AXES = ("yaw", "pitch", "roll")

@@ -12,6 +12,7 @@ from scipy.stats import multivariate_normal
 import synthetic_logs
 from navreplay.adapt.fixed import Fixed
 from navreplay.calibration import _chain_kernel, _linear_kernel
+from navreplay.calibration.auto import carry_over
 from navreplay.calibration.em_offline import improve_factors, maximise_likelihood
 from navreplay.calibration.linear_log import (
     LinearLog,
@@ -353,6 +354,30 @@ def test_auto_is_the_fixed_filter_where_the_told_noise_is_right(log):
     fixed = run_filter(log.timeline(), build_method("fixed"), AUTO)
     assert found.estimated["position_noise_scale"] == 1
     np.testing.assert_array_equal(found.lla, fixed.lla)
+
+
+def test_ratios_of_a_pass_are_carried_to_one_with_other_stretches_and_epochs():
+    """By time and label; what the pass before did not see has the mean of its kind."""
+    true = {"position": 1.0, "velocity": 1.0, "push": 1.0}
+    short, long = draw_log(1, 30, true), draw_log(1, 40, true)
+    ratios = np.arange(1.0, len(short.residual) + 1)
+    (carried,) = carry_over((short,), (ratios,), (long,), {"position": 2.0, "velocity": 3.0})
+    np.testing.assert_array_equal(carried[: len(ratios)], ratios)
+    np.testing.assert_array_equal(carried[len(ratios) :], long.by_kind({"position": 2.0, "velocity": 3.0})[len(ratios) :])
+    (back,) = carry_over((long,), (carried,), (short,), {})
+    np.testing.assert_array_equal(back, ratios)
+
+
+@pytest.mark.slow
+def test_auto_ends_where_the_told_noise_makes_a_pass_lose_its_way():
+    """The filter with told noise is started anew within this log; that with the noise found is not."""
+    scenario = synthetic_logs.SCENARIOS["step-noise"]
+    flight = synthetic_logs.simulate(scenario, 0)
+    options = FilterOptions(imu_noise=scenario.imu.noise, output_rate=0.0)
+    plain = run_filter(flight.timeline(), build_method("fixed"), options)
+    assert any(event.kind == "restart" for event in plain.events)
+    found = run_filter(flight.timeline(), build_method("auto"), options)
+    assert not any(event.kind == "restart" for event in found.events)
 
 
 def test_auto_finds_correlated_errors_and_smooths(log):
