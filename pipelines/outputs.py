@@ -19,6 +19,7 @@ from pipelines.report.comparison import (
     comparison_tables,
 )
 from pipelines.report.content import Report, build_report, dump_json
+from pipelines.report.sections.course import clock_of
 from pipelines.report.figures import report_plots
 from pipelines.report.html import render_html
 from pipelines.report.markdown import render_markdown
@@ -41,7 +42,9 @@ def write_outputs(result: RunResult, out_dir: str | Path, layer: tuple[str, str]
     report = build_report(result)
     title, subtitle = _title(result)
     figures, tables, notice = headline_figures(report), report_tables(report), verdict_notice(report["verdict"])
-    html = render_html(title, subtitle, figures, report_plots(result), tables, report["configuration"], notice)
+    html = render_html(
+        title, subtitle, figures, report_plots(result), tables, report["configuration"], notice, clock_of([result])
+    )
     markdown = render_markdown(title, figures, tables, notice)
     write_solution = write_solution_csv if result.config.output.format == "csv" else write_solution_parquet
     writers: dict[str, Callable[[Path], object]] = {
@@ -93,7 +96,8 @@ def write_comparison(comparison: Comparison, out_dir: Path) -> dict[str, Path]:
     drive, subtitle = _title(comparison.drawn[0][1])
     title = f"{drive}: {_name_runs(comparison)}"
     figures, tables, notice = comparison_figures(report), comparison_tables(report), comparison_notice(report)
-    html = render_html(title, subtitle, figures, comparison_plots(comparison), tables, report["configuration"], notice)
+    clock = clock_of([result for _, result in comparison.drawn])
+    html = render_html(title, subtitle, figures, comparison_plots(comparison), tables, report["configuration"], notice, clock)
     markdown = render_markdown(title, figures, tables, notice)
     return _write_files(
         out_dir,

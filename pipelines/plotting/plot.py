@@ -8,20 +8,33 @@ import numpy as np
 from navreplay.solution import InnovationSeries, Solution
 from navreplay.timeline import Floats, Times
 from pipelines.plotting.svg import Panel, draw_time_panels
+from pipelines.plotting.track import Track
 
-__all__ = ["Legend", "Plot", "bend_of", "elapsed_s", "has_noise_to_show", "time_plot"]
+__all__ = ["Legend", "Live", "Plot", "bend_of", "elapsed_s", "has_noise_to_show", "time_plot"]
 
 Legend = tuple[tuple[str, str], ...]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False, slots=True)
+class Live:
+    """What a browser that runs scripts draws instead of the drawing: panels over the time of the report, with stretches shaded
+    (start, end) [s]; or a track."""
+
+    panels: tuple[Panel, ...] = ()
+    shades: tuple[tuple[float, float], ...] = ()
+    track: Track | None = None
+
+
+@dataclass(frozen=True, eq=False, slots=True)
 class Plot:
-    """A drawing with its title, what it shows in a sentence, and its legend: pairs of style class and name."""
+    """A drawing with its title, what it shows in a sentence, and its legend: pairs of style class and name. live: the same
+    for a browser that can zoom; None where there is nothing to zoom into."""
 
     title: str
     note: str
     legend: Legend
     svg: str
+    live: Live | None = None
 
 
 def elapsed_s(t_ns: Times, solution: Solution) -> Floats:
@@ -40,7 +53,8 @@ def time_plot(
 ) -> Plot:
     """Panels over the time of a solution; shades and height as in `draw_time_panels`."""
     duration_s = float((solution.t_ns[-1] - solution.t_ns[0]) / 1e9)
-    return Plot(title, note, legend, draw_time_panels(panels, duration_s, shades, height))
+    live = Live(tuple(panels), tuple(shades))
+    return Plot(title, note, legend, draw_time_panels(panels, duration_s, shades, height), live)
 
 
 def has_noise_to_show(series: InnovationSeries) -> bool:

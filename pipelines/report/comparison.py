@@ -9,9 +9,10 @@ import numpy as np
 from navreplay.geodesy.earth import ned_between
 from pipelines.drive.compare import Variant
 from pipelines.drive.result import RunResult
-from pipelines.plotting.plot import Plot, bend_of
+from pipelines.plotting.plot import Live, Plot, bend_of
 from pipelines.plotting.svg import Layer, Panel, draw_map, draw_time_panels, map_height
 from pipelines.report.content import Report
+from pipelines.report.sections.course import track_of
 from pipelines.report.figures import outage_shades
 from pipelines.report.table import Figure, Notice, Table, figure_text
 
@@ -180,7 +181,7 @@ def _error_table(report: Report, quantity: str, stretch: str) -> Table:
         if table[components[0]]["count"]:
             rows.append((label, *figures, str(table[components[0]]["count"])))
     heads = [f"{name.replace('3d', '3-D')} {word}" for name in components for word in _statistics(name).values()]
-    title = f"{quantity.capitalize()} error {_STRETCHES[stretch]} [{unit}]"
+    title = f"{quantity.replace('_', ' ').capitalize()} error {_STRETCHES[stretch]} [{unit}]"
     return Table(title, ("method", *heads, "epochs"), tuple(rows))
 
 
@@ -234,7 +235,8 @@ def comparison_plots(comparison: Comparison) -> tuple[Plot, ...]:
     tracks = _track_layers(labels, styles, results)
     runs = len(comparison.reports)
     of_all = f" The first {len(labels)} of {runs} runs are drawn; the tables show all." if runs > len(labels) else ""
-    plots = [_plot_tracks(tracks, results[0], of_all)]
+    live = Live(shades=outage_shades(results[0]), track=track_of(results, labels, styles))
+    plots = [_plot_tracks(tracks, results[0], of_all, live)]
     judged = [result.evaluation for result in results if result.evaluation is not None]
     for quantity in judged[0].errors if judged else ():
         beside_tracks = map_height(tracks) if len(plots) == 1 else None
@@ -242,11 +244,11 @@ def comparison_plots(comparison: Comparison) -> tuple[Plot, ...]:
     return tuple(plots)
 
 
-def _plot_tracks(layers: Sequence[Layer], first: RunResult, of_all: str) -> Plot:
+def _plot_tracks(layers: Sequence[Layer], first: RunResult, of_all: str, live: Live) -> Plot:
     legend = tuple((f"{layer.kind} {layer.style}", layer.name) for layer in layers)
     lat, lon = np.degrees(first.solution.lla[0, :2])
     note = f"East and north of the first position, {lat:.6f}°, {lon:.6f}°.{of_all}"
-    return Plot("Track", note, legend, draw_map(layers))
+    return Plot("Track", note, legend, draw_map(layers), live)
 
 
 def _track_layers(labels: Sequence[str], styles: Sequence[str], results: Sequence[RunResult]) -> list[Layer]:
@@ -289,5 +291,6 @@ def _plot_errors(
         ]
         panels.append(Panel(f"{axis} [{unit}]", tuple(layers), bend))
     note = f"Estimated minus reference.{'' if bend is None else ' Signed logarithmic scale.'}{of_all}"
-    svg = draw_time_panels(panels, duration, outage_shades(results[0]), height)
-    return Plot(f"{quantity.capitalize()} error", note, legend, svg)
+    shades = outage_shades(results[0])
+    svg = draw_time_panels(panels, duration, shades, height)
+    return Plot(f"{quantity.replace('_', ' ').capitalize()} error", note, legend, svg, Live(tuple(panels), shades))

@@ -11,11 +11,12 @@ from navreplay.solution import InnovationSeries, Solution
 from navreplay.timeline import FixStatus, Floats, Timeline
 from pipelines.drive.result import RunResult
 from pipelines.plotting.angles import suit_errors, suit_innovations
-from pipelines.plotting.plot import Legend, Plot, bend_of, elapsed_s, has_noise_to_show, time_plot
+from pipelines.plotting.plot import Legend, Live, Plot, bend_of, elapsed_s, has_noise_to_show, time_plot
 from pipelines.plotting.sky import plot_satellites, plot_shared_noise, sky_plots
 from pipelines.plotting.svg import Layer, Panel, draw_map, map_height
 from pipelines.plotting.weights import plot_weights
 from pipelines.report.content import outage_errors
+from pipelines.report.sections.course import track_of
 
 __all__ = ["outage_shades", "report_plots"]
 
@@ -60,7 +61,9 @@ def _plot_track(result: RunResult, layers: Sequence[Layer]) -> Plot:
         (f"{layer.kind} {layer.style}", layer.name) for layer in sorted(layers, key=lambda layer: layer.kind != "line")
     )
     lat, lon = np.degrees(result.solution.lla[0, :2])
-    return Plot("Track", f"East and north of the first position, {lat:.6f}°, {lon:.6f}°.", legend, draw_map(layers))
+    note = f"East and north of the first position, {lat:.6f}°, {lon:.6f}°."
+    live = Live(shades=outage_shades(result), track=track_of([result], ["solution"], ["c1"]))
+    return Plot("Track", note, legend, draw_map(layers), live)
 
 
 def _track_layers(result: RunResult) -> list[Layer]:
@@ -143,7 +146,7 @@ def _plot_errors(evaluation: Evaluation, solution: Solution, shades: Sequence[tu
         ]
         note = "Estimated minus reference, with the 3-sigma envelope." + ("" if bend is None else " Signed logarithmic scale.")
         legend = (("line c1", "error"), ("band c1", "3 sigma"))
-        plots.append(time_plot(f"{quantity.capitalize()} error", note, legend, panels, solution, shades))
+        plots.append(time_plot(f"{quantity.replace('_', ' ').capitalize()} error", note, legend, panels, solution, shades))
     return plots
 
 

@@ -26,12 +26,15 @@ class Notice:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A table of texts. note: one sentence below it (may be empty). One column without a header is a list of sentences."""
+    """A table of texts. note: one sentence below it (may be empty). One column without a header is a list of sentences. spans:
+    per row the stretch (start, end) [s since the first row of the solution] that it tells of, None where it tells of none;
+    empty where no row does."""
 
     title: str
     header: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     note: str = ""
+    spans: tuple[tuple[float, float] | None, ...] = ()
 
     @property
     def is_list(self) -> bool:

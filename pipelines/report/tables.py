@@ -134,12 +134,14 @@ def _outage_tables(outages: Mapping[str, Any]) -> list[Table]:
         )
         for number, outage in enumerate(outages["list"], start=1)
     ]
+    starts = [(outage["start_elapsed_s"], outage["start_elapsed_s"] + outage["length_s"]) for outage in outages["list"]]
     counted = f"of {_counted_text(outages)}"
     for share, word in (("p50", "median"), ("p95", "95 %")) if outages["counted"] else ():
         figures = (figure_text(outages["summary"][name.removesuffix("_m")][share]) for name in names)
         rows.append((word, "", "", "", *figures, counted))
     header = ("", "start UTC", "length", "distance", "end horizontal", "end 3-D", "largest horizontal", "largest 3-D", "cause")
-    return [Table("Outages [m]", header, tuple(rows), "Errors at the end are those before the next fix corrects.")]
+    spans = (*starts, *[None] * (len(rows) - len(starts)))
+    return [Table("Outages [m]", header, tuple(rows), "Errors at the end are those before the next fix corrects.", spans)]
 
 
 def _counted_text(outages: Mapping[str, Any]) -> str:
@@ -209,12 +211,13 @@ def _text_tables(report: Report) -> list[Table]:
     findings = tuple((f["level"], f["text"], f["hint"]) for f in report["findings"])
     events = tuple((e["utc"].partition("T")[2][:10], e["level"], e["text"]) for e in report["events"][:200])
     files = tuple((f["path"], f["format"], str(f["size"]), f["sha256"]) for f in report["files"])
+    moments = tuple((e["elapsed_s"], e["elapsed_s"]) for e in report["events"][:200])
     more = len(report["events"]) - len(events)
     tables = [
         Table("Findings", ("level", "finding", "what to do"), findings),
         Table("Damage", ("found in the files",), tuple((text,) for text in report["damage"])),
         Table("Assumptions", ("assumed or converted on the way",), tuple((text,) for text in report["assumptions"])),
-        Table("Events", ("UTC", "level", "event"), events, f"{more} more are in report.json." if more else ""),
+        Table("Events", ("UTC", "level", "event"), events, f"{more} more are in report.json." if more else "", moments),
         Table("Files", ("file", "format", "bytes", "SHA-256"), files),
         Table("Time spent", ("stage", "seconds"), tuple((k, figure_text(v)) for k, v in report["timing_s"].items())),
     ]
