@@ -19,10 +19,10 @@ from pipelines.report.comparison import (
     comparison_tables,
 )
 from pipelines.report.content import Report, build_report, dump_json
-from pipelines.report.sections.course import clock_of
 from pipelines.report.figures import report_plots
 from pipelines.report.html import render_html
 from pipelines.report.markdown import render_markdown
+from pipelines.report.sections.course import clock_of
 from pipelines.report.tables import headline_figures, report_tables
 from pipelines.report.verdict import verdict_notice
 from pipelines.trajectory.launch_csv import write_launch_csv

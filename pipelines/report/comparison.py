@@ -12,8 +12,8 @@ from pipelines.drive.result import RunResult
 from pipelines.plotting.plot import Live, Plot, bend_of
 from pipelines.plotting.svg import Layer, Panel, draw_map, draw_time_panels, map_height
 from pipelines.report.content import Report
-from pipelines.report.sections.course import track_of
 from pipelines.report.figures import outage_shades
+from pipelines.report.sections.course import track_of
 from pipelines.report.table import Figure, Notice, Table, figure_text
 
 __all__ = [

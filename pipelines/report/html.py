@@ -84,8 +84,9 @@ def _render_figure(figure: Figure) -> str:
 
 def _render_plot(plot: Plot, index: int) -> str:
     legend = "".join([_render_sample(style) + f"{escape(name)}</span>" for style, name in plot.legend])
+    live = "" if plot.live is None else f' data-live="{index}"'
     return (
-        f"<figure{'' if plot.live is None else f' data-live={index}'}><figcaption><h2>{escape(plot.title)}</h2><p>{escape(plot.note)}</p>"
+        f"<figure{live}><figcaption><h2>{escape(plot.title)}</h2><p>{escape(plot.note)}</p>"
         f'<div class="legend">{legend}</div></figcaption>{plot.svg}<output></output></figure>\n'
     )
 
