@@ -1,4 +1,4 @@
-"""What a browser needs to draw plots itself, as one compressed block: the points of their layers, thinned so that extremes stay."""
+"""What a browser needs to draw plots itself, as one compressed block: the points of their layers, thinned, extremes kept."""
 
 import base64
 import gzip

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -55,5 +56,5 @@ def thin_course(t_s: Floats, east: Floats, north: Floats, worst: Floats | None =
     kept = [known[edges[:-1]], known[-1:]]
     if worst is not None:
         values = np.where(np.isfinite(worst[known]), worst[known], -np.inf)
-        kept.append(known[[low + int(np.argmax(values[low:high])) for low, high in zip(edges, edges[1:], strict=False)]])
+        kept.append(known[[low + int(np.argmax(values[low:high])) for low, high in pairwise(edges.tolist())]])
     return np.unique(np.concatenate(kept))
