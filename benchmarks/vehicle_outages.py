@@ -19,11 +19,12 @@ from navreplay.filters.presets import build_method
 from navreplay.filters.run import run_filter
 from navreplay.geodesy.rotation import matrix_from_quat, quat_from_euler
 from navreplay.options import FilterOptions, VehicleOptions
-from navreplay.timeline import Floats, GnssFixSeries, ImuSeries, SpeedSeries, Timeline, Times
+from navreplay.timeline import Floats, GnssFixSeries, ImuSeries, Timeline
 from pipelines.config.spec import Config, load_config
 from pipelines.drive.outages import outage_windows
 from pipelines.drive.process import filter_drive, read_drive
 from synthetic_logs import SCENARIOS, simulate, truth_at, with_duration
+from synthetic_logs.sensors.wheels import WheelErrors, wheels_of
 from synthetic_logs.simulation import SyntheticLog
 
 FOLDER = Path(__file__).parent.parent / "examples" / "drive_0708"
@@ -36,6 +37,7 @@ SETTINGS = (
 SECOND = 1_000_000_000
 SCENARIO = with_duration(SCENARIOS["car-city"], 360.0)
 OUTAGES_S = ((120, 150), (190, 220), (260, 290))
+WHEELS = WheelErrors(quantum=0.2, scale=1.02, late=0.2)
 SHAKEN = {"gyro": 0.005, "accel": 0.2}
 """Vibration of a car in motion, per sample at 100 Hz [rad/s], [m/s^2]; told as the noise of the IMU."""
 PITCH, YAW = np.radians(1.0), np.radians(2.0)
@@ -95,16 +97,6 @@ def without(fixes: GnssFixSeries, begin_ns: int) -> GnssFixSeries:
     return GnssFixSeries(*(getattr(fixes, field.name)[kept] for field in fields(fixes)))
 
 
-def wheels_of(log: SyntheticLog, seed: int) -> SpeedSeries:
-    """At 10 Hz, in steps of 0.2 m/s, 2 % too small and 0.2 s late."""
-    t_ns: Times = log.imu.t_ns[10:-40:10]
-    truth = truth_at(log.scenario.journey, t_ns)
-    forward: Floats = np.einsum("ki,ki->k", matrix_from_quat(truth.q_nb)[:, :, 0], truth.vel_n)
-    noise = 0.03 * np.random.default_rng(seed).standard_normal(len(t_ns))
-    told = np.round((forward + noise) / 1.02 / 0.2) * 0.2
-    return SpeedSeries(t_ns + SECOND // 5, told, np.full(len(t_ns), np.nan))
-
-
 def shaken(log: SyntheticLog, c_bv: Floats, seed: int) -> ImuSeries:
     """The IMU of a car that vibrates while it moves, askew in it."""
     rng = np.random.default_rng(1000 + seed)
@@ -128,7 +120,9 @@ def synthetic(vehicle: VehicleOptions, wheeled: bool, seeds: int) -> tuple[list[
         begin_ns = int(timeline.imu.t_ns[0])
         imu = shaken(log, c_bv, seed)
         fixes = without(timeline.fixes, begin_ns)
-        wheels = wheels_of(log, seed) if wheeled else None
+        truth = truth_at(log.scenario.journey, log.imu.t_ns[10:-40:10])
+        wheels = wheels_of(truth, WHEELS, np.random.default_rng(seed)) if wheeled else None
+        wheels = None if wheels is None else replace(wheels, turn=np.full(len(wheels), np.nan))
         fit = None if wheels is None else fit_speed(wheels, fixes)
         speed = None if wheels is None or fit is None else apply_fit(wheels, fit)
         cut = replace(timeline, imu=imu, fixes=fixes, speed=speed, fix_lever_b=c_bv @ timeline.fix_lever_b)

@@ -13,21 +13,19 @@ from navreplay.filters.run import run_filter
 from navreplay.measurements.climb import climb_measurement, find_climbs
 from navreplay.mechanisation.strapdown import NavState
 from navreplay.options import FilterOptions, VehicleOptions
-from navreplay.timeline import BaroSeries, GnssFixSeries
+from navreplay.timeline import GnssFixSeries
 from synthetic_logs import SCENARIOS, simulate, truth_at, with_duration
+from synthetic_logs.sensors.wheels import BaroErrors, barometer_of
 
 SECOND = 1_000_000_000
 SCENARIO = with_duration(SCENARIOS["car-city"], 240.0)
 OUTAGE = (100, 160)
 
 
-def barometer(log, noise=0.1, seed=1):
-    """At 10 Hz, with white noise, a zero of its own and a drift of half a metre in the drive."""
-    t_ns = log.imu.t_ns[10:-10:10]
-    rng = np.random.default_rng(seed)
-    drift = np.linspace(0.0, 0.5, len(t_ns))
-    height = truth_at(log.scenario.journey, t_ns).lla[:, 2]
-    return BaroSeries(t_ns, height - 37.0 + drift + noise * rng.standard_normal(len(t_ns)))
+def barometer(log, seed=1):
+    """At 10 Hz."""
+    truth = truth_at(log.scenario.journey, log.imu.t_ns[10:-10:10])
+    return barometer_of(truth, BaroErrors(), np.random.default_rng(seed))
 
 
 def select(fixes, rows):

@@ -10,7 +10,6 @@ from navreplay.calibration.wheels import apply_fit, fit_speed, fit_turn
 from navreplay.evaluation.metrics import evaluate
 from navreplay.filters.presets import build_method
 from navreplay.filters.run import run_filter
-from navreplay.geodesy.rotation import matrix_from_quat
 from navreplay.measurements.body_velocity import (
     VehiclePoint,
     body_velocity,
@@ -21,6 +20,8 @@ from navreplay.mechanisation.strapdown import NavState
 from navreplay.options import FilterOptions, VehicleOptions
 from navreplay.timeline import GnssFixSeries, LogError, SpeedSeries
 from synthetic_logs import SCENARIOS, simulate, truth_at, with_duration
+from synthetic_logs.sensors.wheels import WheelErrors
+from synthetic_logs.sensors.wheels import wheels_of as simulate_wheels
 
 SECOND = 1_000_000_000
 SCENARIO = with_duration(SCENARIOS["car-city"], 240.0)
@@ -31,16 +32,10 @@ def log():
     return simulate(SCENARIO, 5)
 
 
-def wheels_of(log, scale=1.0, late_s=0.0, quantum=0.0, track=1.5):
-    """At 10 Hz, with noise; counts of the sensor are speeds over scale, told late."""
-    t_ns = log.imu.t_ns[10:-40:10]
-    truth = truth_at(log.scenario.journey, t_ns)
-    forward = np.einsum("ki,ki->k", matrix_from_quat(truth.q_nb)[:, :, 0], truth.vel_n)
-    rng = np.random.default_rng(1)
-    speed = forward + 0.03 * rng.standard_normal(len(t_ns)) * (forward > 0.1)
-    speed = np.round(speed / quantum) * quantum if quantum else speed
-    turn = log.imu.gyro[10:-40:10, 2] * track
-    return SpeedSeries(t_ns + round(late_s * SECOND), speed / scale, turn / scale)
+def wheels_of(log, **errors):
+    """At 10 Hz."""
+    truth = truth_at(log.scenario.journey, log.imu.t_ns[10:-40:10])
+    return simulate_wheels(truth, WheelErrors(**errors), np.random.default_rng(1))
 
 
 def select(fixes, rows):
@@ -48,7 +43,7 @@ def select(fixes, rows):
 
 
 def test_scale_delay_and_quantum_are_found(log):
-    told = wheels_of(log, scale=1.03, late_s=0.3, quantum=0.25)
+    told = wheels_of(log, scale=1.03, late=0.3, quantum=0.25)
     fit = fit_speed(told, log.timeline().fixes)
     assert fit.scale == pytest.approx(1.03, rel=0.004)
     assert fit.delay == pytest.approx(-0.3, abs=0.05)
@@ -105,7 +100,7 @@ def test_an_outage_with_wheels_is_a_fraction_of_one_without():
         drawn = simulate(SCENARIO, seed)
         seconds = (drawn.timeline().fixes.t_ns - drawn.imu.t_ns[0]) / 1e9
         fixes = select(drawn.timeline().fixes, (seconds < 120) | (seconds > 160))
-        settled = wheels_of(drawn, scale=1.02, late_s=0.2, quantum=0.1)
+        settled = wheels_of(drawn, scale=1.02, late=0.2, quantum=0.1)
         settled = apply_fit(settled, fit_speed(settled, fixes))
         settled = replace(settled, turn=settled.turn / 1.5 * 1.02)
         at = truth_at(drawn.scenario.journey, int(drawn.imu.t_ns[0]) + np.array([158, 159, 160]) * SECOND)
