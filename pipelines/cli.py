@@ -11,7 +11,7 @@ from pathlib import Path
 __all__ = ["EXPORT_FORMATS", "main"]
 
 # As pipelines.trajectory.export has them; not imported from there, so that --help stays quick.
-EXPORT_FORMATS = ("csv", "parquet", "tum", "kitti", "kml", "geojson", "pos", "sbet")
+EXPORT_FORMATS = ("csv", "parquet", "tum", "kitti", "kml", "geojson", "pos", "sbet", "smrmsg", "nmea", "gpx")
 
 
 def main(argv: Sequence[str] | None = None) -> int:

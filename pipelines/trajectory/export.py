@@ -20,6 +20,7 @@ from navreplay.geodesy.rotation import (
 from navreplay.geodesy.time_scales import utc_from_gps, week_tow_from_gps
 from navreplay.timeline import Floats, LogError
 from pipelines.files.whole_file import write_whole
+from pipelines.trajectory.sentences import write_gpx, write_nmea, write_smrmsg
 from pipelines.trajectory.solution_csv import SolutionTable, find_solution, read_solution_csv, utc_text
 
 __all__ = ["EXPORT_FORMATS", "export"]
@@ -148,6 +149,9 @@ _WRITERS: dict[str, Writer] = {
     "geojson": _write_geojson,
     "pos": _write_pos,
     "sbet": _write_sbet,
+    "smrmsg": write_smrmsg,
+    "nmea": write_nmea,
+    "gpx": write_gpx,
 }
 EXPORT_FORMATS = {
     "csv": "solution.csv as it is, or the same columns from solution.parquet",
@@ -158,5 +162,8 @@ EXPORT_FORMATS = {
     "geojson": "GeoJSON line with times",
     "pos": "RTKLIB .pos with velocities",
     "sbet": "Applanix SBET, smoothed best estimate of trajectory",
+    "smrmsg": "the standard deviations that belong to an SBET",
+    "nmea": "NMEA 0183, GGA and RMC per row",
+    "gpx": "GPX 1.1 track with times",
 }
 """Export formats, a line each."""

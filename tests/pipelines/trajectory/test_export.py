@@ -6,7 +6,9 @@ import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
 from pathlib import Path
 
+import gpxpy
 import numpy as np
+import pynmeagps
 import pytest
 from pyarrow import parquet
 
@@ -84,8 +86,8 @@ def test_unreadable_solution_is_told_in_one_line(tmp_path: Path) -> None:
 
 
 def test_unknown_format_names_those_there_are(run_folder: Path) -> None:
-    with pytest.raises(LogError, match=r"gpx.*tum"):
-        export(run_folder, "gpx", run_folder / "x.gpx")
+    with pytest.raises(LogError, match=r"shapefile.*tum"):
+        export(run_folder, "shapefile", run_folder / "x.shp")
 
 
 @pytest.mark.parametrize("format", EXPORT_FORMATS)
@@ -236,3 +238,37 @@ def test_a_folder_with_parquet_exports_like_one_with_csv(run_folder: Path, tmp_p
     assert (tmp_path / "back.csv").read_text().splitlines()[1].split(",")[2] == first_line[2]
     export(other, "parquet", tmp_path / "same.parquet")
     assert (tmp_path / "same.parquet").read_bytes() == (other / "solution.parquet").read_bytes()
+
+
+def test_nmea_is_read_by_pynmeagps(run_folder: Path, solution: Solution) -> None:
+    export(run_folder, "nmea", run_folder / "out.nmea")
+    with (run_folder / "out.nmea").open("rb") as file:
+        sentences = [parsed for _, parsed in pynmeagps.NMEAReader(file, quitonerror=2)]
+    fixes = [one for one in sentences if one.msgID == "GGA"]
+    courses = [one for one in sentences if one.msgID == "RMC"]
+    assert len(fixes) == len(courses) == len(solution)
+    lla = np.array([[np.radians(one.lat), np.radians(one.lon), one.alt + float(one.sep)] for one in fixes])
+    assert np.abs(ned_between(solution.lla, lla)).max() < 2e-3
+    speed = np.array([float(one.spd) for one in courses]) * 1852 / 3600
+    assert np.allclose(speed, np.hypot(*solution.vel_n[:, :2].T), atol=1e-3)
+    utc = np.array([f"{one.date}T{one.time}" for one in courses], dtype="datetime64[ns]").astype(np.int64)
+    assert np.abs(utc - utc_from_gps(solution.t_ns)).max() <= 1_000_000
+
+
+def test_gpx_is_read_by_gpxpy(run_folder: Path, solution: Solution) -> None:
+    export(run_folder, "gpx", run_folder / "out.gpx")
+    (segment,) = gpxpy.parse((run_folder / "out.gpx").read_text()).tracks[0].segments
+    lla = np.array([[np.radians(p.latitude), np.radians(p.longitude), p.elevation] for p in segment.points])
+    assert np.abs(ned_between(solution.lla, lla)).max() < 1e-3
+    seconds = np.array([p.time.timestamp() for p in segment.points])
+    assert np.abs(seconds - utc_from_gps(solution.t_ns) / 1e9).max() < 1e-5
+
+
+def test_smrmsg_stands_beside_the_sbet_row_by_row(run_folder: Path, solution: Solution) -> None:
+    for format in ("sbet", "smrmsg"):
+        export(run_folder, format, run_folder / format)
+    sbet = np.fromfile(run_folder / "sbet", dtype="<f8").reshape(-1, 17)
+    records = np.fromfile(run_folder / "smrmsg", dtype="<f8").reshape(-1, 10)
+    assert np.array_equal(records[:, 0], sbet[:, 0])
+    assert np.allclose(records[:, 1:7], solution.std[:, :6], rtol=1e-5)
+    assert np.allclose(records[:, 9] / 60, np.degrees(euler_std(solution.q_nb, solution.cov[:, 6:9, 6:9]))[:, 2], rtol=1e-4)
