@@ -25,8 +25,8 @@ def test_errors_are_those_of_the_page(result):
     error = result.evaluation.errors["position"].error
     horizontal, total = np.hypot(*error[:, :2].T), np.linalg.norm(error, axis=1)
     assert len(error) == 1323
-    assert all(np.array(percentiles(horizontal)) < [0.5, 2.0, 7.1])
-    assert all(np.array(percentiles(total)[:2]) < [1.3, 2.8])
+    assert all(np.array(percentiles(horizontal)) < [0.57, 2.0, 7.2])
+    assert all(np.array(percentiles(total)[:2]) < [1.6, 2.8])
 
 
 def test_the_covariance_is_not_too_small(result):
