@@ -23,6 +23,7 @@ from pipelines.report.figures import report_plots
 from pipelines.report.html import render_html
 from pipelines.report.markdown import render_markdown
 from pipelines.report.sections.course import clock_of
+from pipelines.report.sections.stretches import stretch_tables
 from pipelines.report.tables import headline_figures, report_tables
 from pipelines.report.verdict import verdict_notice
 from pipelines.trajectory.launch_csv import write_launch_csv
@@ -42,6 +43,7 @@ def write_outputs(result: RunResult, out_dir: str | Path, layer: tuple[str, str]
     report = build_report(result)
     title, subtitle = _title(result)
     figures, tables, notice = headline_figures(report), report_tables(report), verdict_notice(report["verdict"])
+    tables = (*stretch_tables(result), *tables)
     html = render_html(
         title, subtitle, figures, report_plots(result), tables, report["configuration"], notice, clock_of([result])
     )
