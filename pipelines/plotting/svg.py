@@ -120,7 +120,8 @@ def _extent(layers: Iterable[Layer]) -> tuple[float, float]:
 
 
 def _number(value: float) -> str:
-    return f"{value:.6g}".replace("-", "\u2212")
+    text = f"{value:.6g}".replace("e+0", "e").replace("e-0", "e-").replace("e+", "e")
+    return text.replace("-", "\u2212")
 
 
 def _draw_panel(panel: Panel, across: Scale, shades: Sequence[tuple[float, float]], top: float, tall: float) -> str:
@@ -185,7 +186,8 @@ def draw_map(layers: Sequence[Layer], unit: str = "m") -> str:
     for tick in nice_ticks(across.low, across.high, 6):
         x = _LEFT + float(across.place(np.array(tick)))
         parts.append(f'<path class="grid" d="M{x:.1f} {_TOP}V{_TOP + tall:.1f}"/>')
-        parts.append(f'<text class="tick" x="{x:.1f}" y="{_TOP + tall + 14:.1f}" text-anchor="middle">{_number(tick)}</text>')
+        anchor = "end" if x > _WIDTH - 24 else "middle"
+        parts.append(f'<text class="tick" x="{x:.1f}" y="{_TOP + tall + 14:.1f}" text-anchor="{anchor}">{_number(tick)}</text>')
     for tick in nice_ticks(up.low, up.high, 6):
         y = _TOP + tall - float(up.place(np.array(tick)))
         parts.append(f'<path class="grid" d="M{_LEFT} {y:.1f}H{_WIDTH - _RIGHT}"/>')

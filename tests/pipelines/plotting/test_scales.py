@@ -143,3 +143,12 @@ def test_noise_is_shown_where_it_changes_or_is_not_that_told() -> None:
     assert has_noise_to_show(replace(series, noise_std=2 * ones))
     changing = ones * np.arange(1, 5)[:, None]
     assert has_noise_to_show(replace(series, noise_std=changing, nominal_std=changing))
+
+
+def test_ticks_of_a_map_stay_within_the_drawing_and_large_ones_are_short() -> None:
+    edge = np.array([-1500.0, 1500.0])
+    drawing = draw_map([Layer("line", edge, edge, "c1", "track")])
+    for x, anchor in re.findall(r'class="tick" x="([\d.]+)"[^>]*text-anchor="(\w+)"', drawing):
+        assert anchor == "end" or float(x) <= 520 - 24
+    tall = draw_time_panels([Panel("count", (Layer("line", np.arange(2.0), np.array([0.0, 3e6]), "c1", "n"),))], 1.0)
+    assert ">1e6<" in tall
