@@ -17,6 +17,7 @@ from pipelines.plotting.svg import Layer, Panel, draw_map, map_height
 from pipelines.plotting.weights import plot_weights
 from pipelines.report.content import outage_errors
 from pipelines.report.sections.course import track_of
+from pipelines.report.sections.over_time import plot_along_across, plot_nis
 
 __all__ = ["outage_shades", "report_plots"]
 
@@ -32,7 +33,7 @@ def report_plots(result: RunResult) -> tuple[Plot, ...]:
     track = _track_layers(result)
     plots = [_plot_track(result, track), _plot_motion(result, shades, map_height(track))]
     if evaluation is not None:
-        plots += _plot_errors(evaluation, solution, shades)
+        plots += [*_plot_errors(evaluation, solution, shades), plot_along_across(evaluation, solution, shades)]
     else:
         plots.append(_plot_deviations(solution, shades))
     plots.append(_plot_attitude(solution, shades))
@@ -43,6 +44,7 @@ def report_plots(result: RunResult) -> tuple[Plot, ...]:
         noise = plot_shared_noise if series.sources else _plot_noise
         plots.append(_plot_innovations(series, solution, shades))
         plots += [noise(series, solution, shades)] if has_noise_to_show(series) else []
+    plots += [plot_nis(measured, solution, shades)] if measured else []
     plots += [plot_satellites(series, solution, shades) for series in measured if series.sources]
     if solution.weights is not None:
         plots.append(plot_weights(solution.weights, solution, shades))
