@@ -17,8 +17,8 @@ from pipelines.plotting.track import Course, Track
 
 __all__ = ["Clock", "pack_plots", "unpack_array"]
 
-_MOST_POINTS = 280_000
-"""Of all layers together: about 1.2 MB in the page."""
+_MOST_POINTS = 220_000
+"""Of all layers together: about 1 MB in the page."""
 _FEWEST_BINS, _MOST_BINS = 700, 20_000
 _TIME_STEP_S, _PLACE_STEP_M = 1e-4, 1e-2
 _MANTISSA_KEPT = 0xFFFFFFE0
