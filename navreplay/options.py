@@ -17,6 +17,7 @@ __all__ = [
     "LaunchOptions",
     "MotionOptions",
     "RangeOptions",
+    "SetUpOptions",
     "VehicleOptions",
 ]
 
@@ -250,6 +251,15 @@ class CorrelatedNoise:
 
 
 @dataclass(frozen=True, slots=True)
+class SetUpOptions:
+    """What is estimated of the set-up of the sensors, beside the motion: names of parameters (see
+    `navreplay.error_models.set_up`), and the covariance (p, p) of what they are off by from what the timeline holds."""
+
+    names: tuple[str, ...] = ()
+    cov: tuple[tuple[float, ...], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class FilterOptions:
     """Everything a filter run is told beside the timeline and the method.
 
@@ -260,7 +270,8 @@ class FilterOptions:
     velocity_std_floor [m/s]: least standard deviations believed. default_position_std, default_velocity_std: (horizontal,
     vertical) by name of FixStatus where the covariance is unknown. use: what aids the filter beside attitudes; ``auto`` takes
     ranges where the log has them, ``attitudes`` neither ranges nor fixes. launch: mechanisation and errors move in the
-    launch-inertial frame (None: in NED). smooth: carry all measurements backward as well.
+    launch-inertial frame (None: in NED). set_up: of the
+    sensors, estimated beside the motion by fixes. smooth: carry all measurements backward as well.
     """
 
     imu_noise: ImuNoise = GRADES["consumer"]
@@ -295,3 +306,4 @@ class FilterOptions:
     vehicle: VehicleOptions = VehicleOptions()
     launch: LaunchOptions | None = None
     consider: ConsiderOptions = ConsiderOptions()
+    set_up: SetUpOptions = SetUpOptions()

@@ -90,6 +90,8 @@ class Solution:
     NED [m], velocity NED [m/s] and rotation vector in n [rad] (true attitude = exp(phi x) computed attitude).
     status: (k,) int8 of RowStatus. method: name of the preset. estimated: figures of the noise that a method found in the whole
     log and filtered with, by their names in `FilterOptions` and what it holds; empty for other methods. weights: of a bank.
+    beside: (k, c) states behind those of the motion, by which a receiver or the set-up differs; the last of state_names before
+    any that are only considered.
     backward: of a smoothed solution, the median normalised square of the horizontal difference between forward and smoothed
     positions over its expected value; else None.
     """
@@ -111,6 +113,7 @@ class Solution:
     estimated: Mapping[str, float | tuple[float, float]] = field(default_factory=dict)
     weights: WeightSeries | None = None
     backward: float | None = None
+    beside: Floats = field(default_factory=lambda: np.empty((0, 0)))
 
     def __len__(self) -> int:
         return len(self.t_ns)

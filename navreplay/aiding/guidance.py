@@ -94,7 +94,7 @@ def choose_guidance(timeline: Timeline, options: FilterOptions, recorder: Record
     if timeline.ranges is not None and options.use in ("auto", "ranges"):
         main = RangeAiding(timeline.ranges, timeline.fix_lever_b, model, options, recorder)
     elif timeline.fixes is not None and options.use in ("auto", "fixes"):
-        main = FixAiding(timeline.fixes, timeline.fix_lever_b, options, model)
+        main = FixAiding(timeline.fixes, timeline.fix_lever_b, options, model, timeline.imu)
     attitude = timeline.attitude if options.attitude.use else None
     if main is None:
         if attitude is None or options.use not in ("auto", "attitudes"):

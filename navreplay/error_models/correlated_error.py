@@ -61,7 +61,9 @@ class CorrelatedErrors:
     def jacobian(self, labels: Sequence[str]) -> Floats:
         """(m, c) of the components with these labels (``position north``)."""
         mine = [f"{noise.kind} {axis}" for noise in self.noises_told for axis in _AXES]
-        return np.array([[label == name for name in mine] for label in labels], dtype=np.float64)
+        return np.array([[label == name for name in mine] for label in labels], dtype=np.float64).reshape(
+            len(labels), self.size
+        )
 
     def enter(self, cov: Floats) -> Floats:
         """(n + c, n + c) of cov (n, n) where position and velocity were taken from a fix with these errors, of which nothing

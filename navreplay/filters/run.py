@@ -195,6 +195,7 @@ def _join(rows: list[Rows], method: str, model: ErrorModel, recorder: Recorder) 
         weights=recorder.weight_series(),
         events=tuple(sorted(recorder.events, key=lambda event: event.t_ns)),
         backward=backward_agreement([row.agreement for row in rows if row.agreement is not None]),
+        beside=states[:, 28:].copy(),
     )
 
 
