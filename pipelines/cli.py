@@ -13,11 +13,15 @@ __all__ = ["EXPORT_FORMATS", "main"]
 # As pipelines.trajectory.export has them; not imported from there, so that --help stays quick.
 EXPORT_FORMATS = ("csv", "parquet", "tum", "kitti", "kml", "geojson", "pos", "sbet", "smrmsg", "nmea", "gpx")
 
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs one command and returns the exit code: 0, 1 for input that cannot be used, 2 for wrong usage, 3 for a
     poor verdict where --strict was given, 130 for Ctrl-C."""
     arguments = _build_parser().parse_args(argv)
+    for name in _THREADS:  # matrices of a filter are far too small for threads, which wait for each other
+        os.environ.setdefault(name, "1")
     try:
         return _run(arguments)
     except KeyboardInterrupt:
