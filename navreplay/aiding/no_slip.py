@@ -4,6 +4,7 @@ constraint)."""
 import numpy as np
 
 from navreplay.aiding.epochs import Observed
+from navreplay.error_models.clocked import motion_size
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.geodesy.earth import earth_rate_n
 from navreplay.geodesy.rotation import matrix_from_quat, quat_from_euler
@@ -35,15 +36,15 @@ class NoSlipAiding:
         self.t_ns = t_ns
         self._rates = mean_rates(imu, t_ns - _AVERAGED_NS, t_ns + _AVERAGED_NS)
         self._point, self._slip = rear_axle(options, forward)
-        self._size = model.size
+        self._motion, self._size = motion_size(model), model.size
 
     def observe(self, epoch: int, state: NavState, cov: Floats, dtheta: Floats, dt: float) -> Observed:
         """The constraint, in vehicle axes."""
         earth_b = matrix_from_quat(state.q_nb).T @ earth_rate_n(state.lla[0])
         rate_b = (self._rates[epoch] - state.gyro_error) / (1 + state.gyro_scale) - earth_b
-        moved = body_velocity(state, self._point, rate_b, self._size)
+        moved = body_velocity(state, self._point, rate_b, self._motion)
         yaw_rate = float((self._point.c_vb @ rate_b)[2])
-        return Observed(no_slip_measurement(moved, yaw_rate, self._slip), state, cov)
+        return Observed(no_slip_measurement(moved, yaw_rate, self._slip).among(self._size), state, cov)
 
     def gate(self, options: GateOptions) -> EpochGate:
         """A gate of its own that never opens the filter: a refused constraint is a vehicle that slips."""

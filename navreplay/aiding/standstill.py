@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from navreplay.aiding.epochs import Observed
+from navreplay.error_models.clocked import motion_size
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.geodesy.earth import earth_rate_n
 from navreplay.geodesy.rotation import matrix_from_quat
@@ -58,21 +59,21 @@ class StandstillAiding:
     ) -> None:
         self.t_ns = t_ns
         self._noise = np.eye(3) * std**2
-        self._size = model.size
+        self._motion, self._size = motion_size(model), model.size
         self._rates = rates
         self._aided_ns = np.empty(0, np.int64) if aided_ns is None else aided_ns
 
     def observe(self, epoch: int, state: NavState, cov: Floats, dtheta: Floats, dt: float) -> Observed:
         """Velocity zero, NED, and angular rate zero, body axes."""
         zero = np.zeros(3)
-        measured = velocity_measurement(state, zero, angular_rate(state, dtheta, dt), zero, self._noise, self._size)
+        measured = velocity_measurement(state, zero, angular_rate(state, dtheta, dt), zero, self._noise, self._motion)
         parts = [measured._replace(kinds=("standstill",) * 3)]
         if self._rates is not None:
             c_nb = matrix_from_quat(state.q_nb)
             earth_b = c_nb.T @ earth_rate_n(state.lla[0])
             rate_b = (self._rates.rates[epoch] - state.gyro_error) / (1 + state.gyro_scale) - earth_b
-            parts.append(zero_rate_measurement(rate_b, earth_b, c_nb, float(self._rates.stds[epoch]), self._size))
-        return Observed(join(parts), state, cov)
+            parts.append(zero_rate_measurement(rate_b, earth_b, c_nb, float(self._rates.stds[epoch]), self._motion))
+        return Observed(join(parts).among(self._size), state, cov)
 
     def gate(self, options: GateOptions) -> "StopGate":
         """A gate of its own that is never switched off."""

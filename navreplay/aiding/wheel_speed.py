@@ -8,6 +8,7 @@ import numpy as np
 
 from navreplay.aiding.epochs import Observed
 from navreplay.aiding.no_slip import rear_axle
+from navreplay.error_models.clocked import motion_size
 from navreplay.error_models.error_model import ErrorModel
 from navreplay.geodesy.earth import earth_rate_n
 from navreplay.geodesy.rotation import matrix_from_quat
@@ -46,7 +47,7 @@ class WheelSpeedAiding:
         self.t_ns = t_ns
         self._rates = mean_rates(imu, t_ns - _AVERAGED_NS, t_ns + _AVERAGED_NS)
         self._point, _ = rear_axle(options, forward)
-        self._size = model.size
+        self._motion, self._size = motion_size(model), model.size
         seconds, own = (t_ns - wheels.t_ns[0]) / 1e9, (wheels.t_ns - wheels.t_ns[0]) / 1e9
         self._speed = np.interp(seconds, own, wheels.speed)
         self._turn = np.interp(seconds, own, wheels.turn)
@@ -58,12 +59,12 @@ class WheelSpeedAiding:
         """Speed and turn of the vehicle."""
         earth_b = matrix_from_quat(state.q_nb).T @ earth_rate_n(state.lla[0])
         rate_b = (self._rates[epoch] - state.gyro_error) / (1 + state.gyro_scale) - earth_b
-        moved = body_velocity(state, self._point, rate_b, self._size)
+        moved = body_velocity(state, self._point, rate_b, self._motion)
         parts = [wheel_speed_measurement(moved, float(self._speed[epoch]), float(self._std[epoch]))]
         turn = float(self._turn[epoch])
         if np.isfinite(turn):
-            parts.append(wheel_turn_measurement(turn, rate_b, self._point.c_vb, self._turn_std, self._size))
-        return Observed(join(parts), state, cov)
+            parts.append(wheel_turn_measurement(turn, rate_b, self._point.c_vb, self._turn_std, self._motion))
+        return Observed(join(parts).among(self._size), state, cov)
 
     def gate(self, options: GateOptions) -> EpochGate:
         """A gate of its own that never opens the filter: wheels slip and lock."""

@@ -9,12 +9,12 @@ from typing import Protocol
 
 import numpy as np
 
-from navreplay.error_models.error_model import MotionModel
+from navreplay.error_models.error_model import ErrorModel, MotionModel
 from navreplay.error_models.ned import Propagated
 from navreplay.mechanisation.strapdown import Leg, NavState
 from navreplay.timeline import Floats
 
-__all__ = ["ClockedModel", "ReceiverModel"]
+__all__ = ["ClockedModel", "ReceiverModel", "motion_size"]
 
 
 class ReceiverModel(Protocol):
@@ -102,3 +102,8 @@ def _side_by_side(motion: Floats, clock: Floats) -> Floats:
     both = np.zeros((len(motion), n + c, n + c))
     both[:, :n, :n], both[:, n:, n:] = motion, clock
     return both
+
+
+def motion_size(model: ErrorModel) -> int:
+    """Number of the states of motion and of the inertial sensors, which come first in model."""
+    return model.motion.size if isinstance(model, ClockedModel) else model.size

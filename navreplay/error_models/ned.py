@@ -56,7 +56,7 @@ class Propagated(NamedTuple):
 
 
 def gyro_columns(size: int) -> tuple[slice, ...]:
-    """The states that add to the angular rate, of a model with size error states."""
+    """The states that add to the angular rate, of a `NedErrorModel` with size error states, not of one around it."""
     return (GYRO_BIAS, slice(size - 3, size)) if size in (18, 24) else (GYRO_BIAS,)
 
 

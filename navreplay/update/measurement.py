@@ -29,6 +29,11 @@ class Measurement(NamedTuple):
             tuple(self.labels[i] for i in rows),
         )
 
+    def among(self, size: int) -> "Measurement":
+        """The same where its n states are the first of size states, the others of which it does not see."""
+        unseen = size - self.jacobian.shape[1]
+        return self._replace(jacobian=np.pad(self.jacobian, ((0, 0), (0, unseen)))) if unseen else self
+
 
 def join(parts: list[Measurement]) -> Measurement:
     """One measurement of all components of several, their noises independent."""
