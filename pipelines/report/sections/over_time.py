@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from navreplay.evaluation.metrics import Evaluation
 from navreplay.solution import InnovationSeries, Solution
@@ -22,7 +22,7 @@ def plot_nis(measured: Sequence[InnovationSeries], solution: Solution, shades: S
     panels = []
     for series in measured:
         t, known = elapsed_s(series.t_ns, solution), series.nis > 0
-        low, high = (np.full(len(t), bound) for bound in chi2.ppf([0.025, 0.975], series.residual.shape[1]))
+        low, high = (np.full(len(t), bound) for bound in chdtri(series.residual.shape[1], [0.975, 0.025]))
         used, refused = known & series.used, known & ~series.used
         layers = (
             Layer("dots", t[used], series.nis[used], "c1", "used"),

@@ -152,17 +152,18 @@ def arguments_of(log: Path, out: Path, *more: str) -> list[str]:
 
 
 def test_a_key_is_varied_from_the_command_line(log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    more = ["--filters", "fixed,mmae", "--vary", "gnss.noise_scale=0.25,1", "--smooth", "--set", "consider.every_method=true"]
+    launch = ["--set", "filter.frame=launch-inertial", "--set", "launch.point_deg_m=[47.4, 8.5, 460]"]
+    more = ["--filters", "fixed,ckf", "--vary", "gnss.noise_scale=0.25,1", "--smooth", *launch]
     assert cli.main(arguments_of(log, tmp_path / "told", *more)) == 0
     printed = capsys.readouterr().out
     assert "fixed-smoothed, noise_scale 0.25" in printed
-    assert "could not run: mmae-smoothed, noise_scale 1: filter: consider parameters need" in printed
+    assert "could not run: ckf-smoothed, noise_scale 1: filter: cubature points move in NED" in printed
     assert (tmp_path / "told" / "fixed-smoothed-noise_scale-0.25" / "solution.csv").exists()
     assert cli.main(arguments_of(log, tmp_path / "json", *more, "--json")) == 0
     figures = json.loads(capsys.readouterr().out)
     assert figures["varied"] == "gnss.noise_scale"
     assert [(row["method"], row["value"]) for row in figures["methods"]] == [("fixed-smoothed", 0.25), ("fixed-smoothed", 1)]
-    assert list(figures["failures"]) == ["mmae-smoothed, noise_scale 0.25", "mmae-smoothed, noise_scale 1"]
+    assert list(figures["failures"]) == ["ckf-smoothed, noise_scale 0.25", "ckf-smoothed, noise_scale 1"]
     first, second = [row["errors_m"]["all"]["3d_rms"] for row in figures["methods"]]
     assert first != pytest.approx(second, rel=0.01)
 
